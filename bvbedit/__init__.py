@@ -1,0 +1,1 @@
+"""A CAGD toolkit for editing measured BRDFs as B-spline volumes."""

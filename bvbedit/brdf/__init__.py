@@ -1,0 +1,1 @@
+"""Reflectance: directions, charts, encodings, measured, analytic and spline BRDFs, fitting, metrics. Knows no files."""

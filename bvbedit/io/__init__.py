@@ -1,0 +1,1 @@
+"""Files in and out, one module per format. Knows nothing of rendering or editing."""

@@ -1,0 +1,29 @@
+"""How hot loops are compiled: numba, with its cache where a cache can be written.
+
+Modules that import this one pay for importing numba (0.25 s), so they are imported where they are needed.
+"""
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import numba
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def _compile(function: F, **options: Any) -> F:
+    try:
+        return numba.njit(cache=True, **options)(function)  # type: ignore[no-any-return]
+    except RuntimeError:
+        # No cache directory can be written (a read-only installation): compile in each process instead.
+        return numba.njit(**options)(function)  # type: ignore[no-any-return]
+
+
+def kernel(function: F) -> F:
+    """Compile ``function`` for one thread; kernels may call kernels. Its arguments are taken to be right: nothing is checked inside."""
+    return _compile(function, nogil=True)
+
+
+def parallel_kernel(function: F) -> F:
+    """Compile ``function`` with ``prange`` loops spread over numba's threads."""
+    return _compile(function, nogil=True, parallel=True)

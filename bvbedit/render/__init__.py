@@ -1,0 +1,1 @@
+"""Pictures of BRDFs: scenes, a direct-light integrator, image metrics. Knows no commands."""

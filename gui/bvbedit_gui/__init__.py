@@ -1,0 +1,1 @@
+"""The viewer: PyVista scenes of a model. Talks to bvbedit through its public functions only."""
