@@ -20,7 +20,9 @@ class Brdf(ABC):
     """
 
     # Beyond this angle from the normal (radians) a value is extrapolation and must carry no weight in a fit.
-    reliable_elevation: float = np.radians(89.0)
+    reliable_elevation: float = float(np.radians(89.0))
+    # Whether f(wi, wo) = f(wo, wi) by construction, so that a folded chart need not average the two.
+    reciprocal: bool = False
 
     @abstractmethod
     def _evaluate(self, wi: Floats, wo: Floats) -> tuple[Floats, Bools]:

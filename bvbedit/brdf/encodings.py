@@ -1,0 +1,106 @@
+"""Encodings: maps from reflectance to the value that a spline approximates, and back. Decoding is never negative."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bvbedit.brdf.geometry import Floats
+from bvbedit.errors import BvbError
+
+# exp(700) is the last round power that float64 holds: a wild control point decodes to a huge value, not to infinity.
+LARGEST_LOG = 700.0
+
+
+class Encoding(ABC):
+    """A monotone map y = encode(f) of reflectance f >= 0 in 1/sr, with encode(0) = 0."""
+
+    name: str
+
+    @abstractmethod
+    def encode(self, f: Floats) -> Floats:
+        """Return y for reflectance ``f`` (any shape); negative reflectance counts as zero."""
+
+    @abstractmethod
+    def decode(self, y: Floats) -> Floats:
+        """Return f >= 0 for encoded ``y`` (any shape); negative ``y`` counts as zero."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the name and the parameters, as JSON can hold them."""
+        return {"name": self.name, **vars(self)}
+
+
+@dataclass(frozen=True)
+class Linear(Encoding):
+    """y = f."""
+
+    name = "linear"
+
+    def encode(self, f: Floats) -> Floats:
+        return np.maximum(f, 0.0)
+
+    def decode(self, y: Floats) -> Floats:
+        return np.maximum(y, 0.0)
+
+
+@dataclass(frozen=True)
+class Root(Encoding):
+    """y = f^(1/k); k = 3 is also the exponent of the error metric that Fores et al. (2012) found best."""
+
+    k: float = 3.0
+    name = "root"
+
+    def __post_init__(self) -> None:
+        _check_parameter(self.name, "k", self.k, 1.0, 16.0)
+
+    def encode(self, f: Floats) -> Floats:
+        f = np.maximum(f, 0.0)
+        return np.cbrt(f) if self.k == 3 else f ** (1 / self.k)
+
+    def decode(self, y: Floats) -> Floats:
+        y = np.maximum(y, 0.0)
+        return y * y * y if self.k == 3 else y**self.k
+
+
+@dataclass(frozen=True)
+class Log(Encoding):
+    """y = log(1 + f/eps), eps in 1/sr: the same for all materials, or their nets could not be mixed exactly."""
+
+    eps: float = 1e-3
+    name = "log"
+
+    def __post_init__(self) -> None:
+        _check_parameter(self.name, "eps", self.eps, 1e-12, 1e6)
+
+    def encode(self, f: Floats) -> Floats:
+        return np.log1p(np.maximum(f, 0.0) / self.eps)
+
+    def decode(self, y: Floats) -> Floats:
+        return self.eps * np.expm1(np.clip(y, 0.0, LARGEST_LOG))
+
+
+def _check_parameter(encoding: str, name: str, value: float, lowest: float, highest: float) -> None:
+    if not isinstance(value, int | float) or isinstance(value, bool) or not lowest <= value <= highest:
+        raise BvbError(f"{encoding} encoding: {name} is {value!r}. It must be a number in {lowest:g} ... {highest:g}.")
+
+
+ENCODINGS: dict[str, type[Encoding]] = {e.name: e for e in (Linear, Root, Log)}
+
+
+def encoding_named(name: str) -> Encoding:
+    """Return the encoding called ``name`` with its usual parameter. Raises BvbError that lists the names."""
+    return encoding_from_dict({"name": name})
+
+
+def encoding_from_dict(description: Mapping[str, Any]) -> Encoding:
+    """Return the encoding that ``to_dict`` described. Raises BvbError for an unknown name or a bad parameter."""
+    parameters = dict(description)
+    name = parameters.pop("name", None)
+    if not isinstance(name, str) or name not in ENCODINGS:
+        raise BvbError(f"Unknown encoding {name!r}. Choose one of {', '.join(ENCODINGS)}.")
+    try:
+        return ENCODINGS[name](**parameters)
+    except TypeError:
+        raise BvbError(f"Encoding {name} has no parameters {sorted(parameters)}. See its description.") from None

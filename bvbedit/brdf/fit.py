@@ -1,0 +1,143 @@
+"""Fitting a B-spline volume to any BRDF: sample it on the chart's grid, encode, solve least squares."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from bvbedit.brdf.base import Brdf
+from bvbedit.brdf.charts import IN_OUT, Chart, grid_points
+from bvbedit.brdf.encodings import Encoding, Linear
+from bvbedit.brdf.geometry import Bools, Floats
+from bvbedit.brdf.measured import MeasuredBrdf, hold
+from bvbedit.brdf.spline_brdf import SplineBrdf, keep_faces
+from bvbedit.errors import BvbError
+from bvbedit.spline.fitting import fit_weighted, loft
+from bvbedit.spline.knots import place_knots
+
+# The horizon itself, where reflectance need not exist, is looked at from this far above (radians).
+HORIZON_MARGIN = 1e-4
+# Larger values are artefacts of dividing by a vanishing cosine.
+LARGEST_REFLECTANCE = 1e5
+
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Reflectance on a grid of a chart."""
+
+    axes: tuple[Floats, Floats, Floats]
+    values: Floats
+    """(m_0, m_1, m_2, 3) encoded means over the symmetric partners that were measured, or over all if none was."""
+    weights: Floats
+    """(m_0, m_1, m_2): the share of the symmetric partners that were measured."""
+    clamped: float
+    """The share of measured values that were negative and count as zero."""
+
+
+def fit_net(
+    brdf: Brdf,
+    chart: Chart,
+    encoding: Encoding,
+    *,
+    size: Sequence[int],
+    degrees: Sequence[int] = (3, 3, 3),
+    knots: str = "averaged",
+    progress: Progress | None = None,
+) -> SplineBrdf:
+    """Return the B-spline volume of ``size`` control points that approximates ``brdf``, with a report.
+
+    Directions that are one pair in the chart (its folds) are averaged; cells without data carry no weight; the
+    control points of degenerate faces are kept equal. The published configuration alone (``in-out``, ``linear``,
+    ``piegl-tiller``) is lofted to the filled table with equal weights and free faces (Lee & Park 2008).
+    Raises BvbError where size and degrees do not suit each other or the data.
+    """
+    start = perf_counter()
+    if len(size) != 3 or len(degrees) != 3:
+        raise BvbError(f"Size {tuple(size)} and degrees {tuple(degrees)}: give three numbers each, one for each axis.")
+    published = chart is IN_OUT and isinstance(encoding, Linear) and knots == "piegl-tiller"
+    samples = sample(brdf, chart, encoding, partners=not published)
+    vectors = [place_knots(knots, u, n, p) for u, n, p in zip(samples.axes, size, degrees, strict=True)]
+    if published:
+        result = loft(samples.values, samples.axes, vectors, degrees)
+    else:
+        values = hold(samples.values, samples.weights > 0, chart.hold_order)
+        first = loft(values, samples.axes, vectors, degrees)
+        result = fit_weighted(
+            values,
+            samples.weights,
+            samples.axes,
+            vectors,
+            degrees,
+            start=first.spline.control,
+            project=lambda control: keep_faces(control, chart),
+            progress=progress,
+        )
+    report: dict[str, Any] = {
+        "knots": knots,
+        "solver": "lofting" if published else "weighted",
+        "grid": [len(u) for u in samples.axes],
+        "without_data": float(np.mean(samples.weights == 0)),
+        "clamped": samples.clamped,
+        "condition": list(result.conditions),
+        "iterations": result.iterations,
+        "residual": result.residual,
+        "notes": list(result.notes),
+        "seconds": perf_counter() - start,
+    }
+    return SplineBrdf(result.spline, chart, encoding, report)
+
+
+def sample(brdf: Brdf, chart: Chart, encoding: Encoding, *, partners: bool = True) -> Samples:
+    """Return ``brdf`` on the grid of ``chart``, encoded.
+
+    A measurement on that very chart is taken at its own nodes. Otherwise each node is the mean over the pairs that
+    the chart cannot tell apart: the mirror image, and the exchange of wi and wo where the chart folds it but the BRDF
+    does not. Without ``partners`` only the pair that ``chart.to_directions`` names is looked up.
+    Raises BvbError where not one node has data behind it.
+    """
+    if isinstance(brdf, MeasuredBrdf) and brdf.chart is chart:
+        weights = brdf.valid & _reliable(brdf, chart)
+        values = encoding.encode(np.minimum(brdf.values, LARGEST_REFLECTANCE))
+        return _checked(Samples(brdf.axes, values, weights.astype(np.float64), brdf.clamped))
+    wi, wo = (_off_horizon(w) for w in chart.to_directions(grid_points(chart.grid)))
+    pairs = [(wi, wo)]
+    if partners:
+        mirror = np.array([1.0, -1.0, 1.0])
+        pairs.append((wi * mirror, wo * mirror))
+        if chart.reciprocal and not brdf.reciprocal:
+            pairs += [(o, i) for i, o in pairs]
+    total = measured = count = 0.0
+    for i, o in pairs:
+        f, trusted = brdf.evaluate_trusted(i, o)
+        y = encoding.encode(np.minimum(f, LARGEST_REFLECTANCE))
+        total, measured, count = total + y, measured + y * trusted[:, None], count + trusted
+    shape = tuple(len(u) for u in chart.grid)
+    known = (count > 0)[:, None]
+    values = np.where(known, measured / np.maximum(count, 1)[:, None], total / len(pairs))
+    clamped = brdf.clamped if isinstance(brdf, MeasuredBrdf) else 0.0
+    return _checked(Samples(chart.grid, values.reshape(*shape, 3), (count / len(pairs)).reshape(shape), clamped))
+
+
+def _checked(samples: Samples) -> Samples:
+    if not samples.weights.any():
+        raise BvbError("No node of the chart has data behind it: the valid cells are too few or all near grazing.")
+    return samples
+
+
+def _reliable(brdf: MeasuredBrdf, chart: Chart) -> Bools:
+    """Return which nodes of the table have both directions within the reliable elevation, (n_0, n_1, n_2)."""
+    wi, wo = chart.to_directions(grid_points(brdf.axes))
+    lowest = np.cos(brdf.reliable_elevation)
+    return (np.minimum(wi[:, 2], wo[:, 2]) >= lowest).reshape(brdf.valid.shape)
+
+
+def _off_horizon(w: Floats) -> Floats:
+    """Return ``w`` (n, 3) with directions on the horizon lifted by ``HORIZON_MARGIN``, azimuth kept."""
+    low = w[:, 2] < np.sin(HORIZON_MARGIN)
+    w[low, :2] *= (np.cos(HORIZON_MARGIN) / np.hypot(w[low, 0], w[low, 1]))[:, None]
+    w[low, 2] = np.sin(HORIZON_MARGIN)
+    return w

@@ -1,0 +1,71 @@
+"""A BRDF as chart + encoding + B-spline volume: the BVB of Lee & Park (2008), with any chart and encoding."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from bvbedit.brdf.base import Brdf
+from bvbedit.brdf.charts import Chart
+from bvbedit.brdf.encodings import Encoding
+from bvbedit.brdf.geometry import Bools, Floats
+from bvbedit.errors import BvbError
+from bvbedit.spline.tensor import TensorSpline
+
+
+class SplineBrdf(Brdf):
+    """A B-spline volume of encoded RGB reflectance over the unit cube of a chart.
+
+    ``spline`` has three parameters on [0, 1] and three channels. ``report`` tells how the model was fitted, as JSON
+    can hold it; an edited model (``with_spline``) has none, since it would no longer be true.
+    Raises BvbError for a spline of another shape or domain.
+    """
+
+    reliable_elevation = float(np.pi / 2)
+
+    def __init__(
+        self, spline: TensorSpline, chart: Chart, encoding: Encoding, report: Mapping[str, Any] | None = None
+    ) -> None:
+        if spline.parameters != 3 or spline.channels != 3 or spline.domain != ((0.0, 1.0),) * 3:
+            raise BvbError(f"{spline!r} on {spline.domain} is no BRDF. Give 3 parameters on [0, 1] and 3 channels.")
+        self.spline = spline
+        self.chart = chart
+        self.encoding = encoding
+        self.report: Mapping[str, Any] = MappingProxyType(dict(report or {}))
+
+    def __repr__(self) -> str:
+        return f"<SplineBrdf {self.chart.name}, {self.encoding.name}, size {self.spline.size}>"
+
+    @property
+    def reciprocal(self) -> bool:  # type: ignore[override]
+        """Whether the chart makes f(wi, wo) = f(wo, wi)."""
+        return self.chart.reciprocal
+
+    def with_spline(self, spline: TensorSpline) -> "SplineBrdf":
+        """Return the model with the same chart and encoding and an edited ``spline``."""
+        return SplineBrdf(spline, self.chart, self.encoding)
+
+    def _evaluate(self, wi: Floats, wo: Floats) -> tuple[Floats, Bools]:
+        f = self.encoding.decode(self.spline.evaluate(self.chart.to_parameters(wi, wo)))
+        return f, np.ones(len(f), dtype=bool)
+
+
+def keep_faces(control: Floats, chart: Chart) -> Floats:
+    """Return the nearest net (n_0, n_1, n_2, c) that is constant where the chart's degenerate faces demand it.
+
+    An orthogonal projection: the faces' groups of equal control points are nested or disjoint, so that taking the
+    means one face after the other is exact. A net with a single layer on an axis keeps that one.
+    """
+    out = np.array(control)
+    for face in chart.degenerate_faces:
+        layers = np.moveaxis(out, face.axis, 0)[: face.layers]
+        # After moveaxis the axis ``along`` stands one place later if it came before the face's own.
+        along = face.along + (face.along < face.axis)
+        layers[:] = layers.mean(axis=(0, along), keepdims=True)
+    return out
+
+
+def face_spread(control: Floats, chart: Chart) -> float:
+    """Return how far the net is from ``keep_faces`` of it: the largest difference of a control value."""
+    return float(np.abs(control - keep_faces(control, chart)).max())

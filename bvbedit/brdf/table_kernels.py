@@ -1,0 +1,79 @@
+"""Compiled work on tables: logarithms and multilinear interpolation over three axes."""
+
+import math
+
+import numpy as np
+from numba import prange
+
+from bvbedit.brdf.geometry import Bools, Floats
+from bvbedit.jit import kernel, parallel_kernel
+
+
+@parallel_kernel
+def log_table(values: Floats, scale: float) -> Floats:
+    """Return log(1 + scale values) for ``values`` (n, m)."""
+    out = np.empty_like(values)
+    for i in prange(values.shape[0]):
+        for j in range(values.shape[1]):
+            out[i, j] = math.log1p(scale * values[i, j])
+    return out
+
+
+@kernel
+def bracket(nodes: Floats, x: float, periodic: bool) -> tuple[int, int, float]:
+    """Return the two nodes around ``x`` and the share of the second: clamped at the ends, or wrapped with period 1."""
+    last = len(nodes) - 1
+    if x >= nodes[last]:
+        if not periodic:
+            return last, last, 0.0
+        return last, 0, (x - nodes[last]) / (1.0 + nodes[0] - nodes[last])
+    if x <= nodes[0]:
+        return 0, 0, 0.0
+    low, high = 0, last
+    while high - low > 1:
+        middle = (low + high) // 2
+        if nodes[middle] <= x:
+            low = middle
+        else:
+            high = middle
+    return low, high, (x - nodes[low]) / (nodes[high] - nodes[low])
+
+
+@parallel_kernel
+def interpolate(
+    parameters: Floats,
+    axis_0: Floats,
+    axis_1: Floats,
+    axis_2: Floats,
+    periodic: bool,
+    logs: Floats,
+    valid: Bools,
+    scale: float,
+) -> tuple[Floats, Bools]:
+    """Return f (n, 3), trilinear in the logarithms, and whether all nodes that take part are valid (n,)."""
+    f = np.empty((len(parameters), 3))
+    trusted = np.empty(len(parameters), dtype=np.bool_)
+    for n in prange(len(parameters)):
+        i0, i1, s = bracket(axis_0, parameters[n, 0], False)
+        j0, j1, t = bracket(axis_1, parameters[n, 1], False)
+        k0, k1, r = bracket(axis_2, parameters[n, 2], periodic)
+        red = green = blue = 0.0
+        good = True
+        for a in range(2):
+            i = i1 if a else i0
+            wa = s if a else 1.0 - s
+            for b in range(2):
+                j = j1 if b else j0
+                wb = wa * (t if b else 1.0 - t)
+                for c in range(2):
+                    k = k1 if c else k0
+                    w = wb * (r if c else 1.0 - r)
+                    red += w * logs[i, j, k, 0]
+                    green += w * logs[i, j, k, 1]
+                    blue += w * logs[i, j, k, 2]
+                    good = good and (w == 0.0 or valid[i, j, k])
+        f[n, 0] = math.expm1(red) / scale
+        f[n, 1] = math.expm1(green) / scale
+        f[n, 2] = math.expm1(blue) / scale
+        trusted[n] = good
+    return f, trusted

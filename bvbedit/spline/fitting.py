@@ -1,0 +1,213 @@
+"""Least-squares fits of a tensor-product spline to data on a grid: approximate lofting, and the weighted problem.
+
+Lee & Park (2008) loft a volume: least-squares curves along one axis on common knots, then their control points along
+the next. On a full grid with equal weights this is the tensor-product least-squares solution, as the pseudo-inverse
+of a Kronecker product is the Kronecker product of the pseudo-inverses.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bvbedit.errors import BvbError
+from bvbedit.spline.banded import Banded
+from bvbedit.spline.basis import collocation
+from bvbedit.spline.knots import Floats
+from bvbedit.spline.tensor import TensorSpline
+
+# Condition of an axis' collocation matrix beyond which coefficients lose half of their 16 digits to the knots.
+CONDITION_LIMIT = 1e8
+# Weight of the second differences, relative to the mean diagonal of the normal matrix, where that limit is passed:
+# large enough to tame every null vector, small enough to leave what the data determine at 1e-5 of its size.
+PENALTY = 1e-9
+# A dense factor of one axis, m x n doubles, may take this many (256 MiB).
+LARGEST_FACTOR = 1 << 25
+# Marginal weights below this share of the largest are raised to it in the preconditioner, which must be invertible.
+MARGINAL_FLOOR = 1e-4
+
+
+@dataclass(frozen=True)
+class AxisFit:
+    """What one axis contributes to a least-squares fit."""
+
+    matrix: Banded
+    pseudo_inverse: Floats
+    """(n, m): control points = pseudo_inverse @ data."""
+    inverse_normal: Floats
+    """(n, n): inverse of the (weighted, penalised) normal matrix."""
+    condition: float
+    """Condition number of the (weighted) collocation matrix, before any penalty; the normal matrix has its square."""
+    penalised: bool
+
+
+@dataclass(frozen=True)
+class FitResult:
+    """A fitted spline and how it came about."""
+
+    spline: TensorSpline
+    conditions: tuple[float, ...]
+    """Condition number of each axis' collocation matrix."""
+    notes: tuple[str, ...]
+    """What a user should know: penalties, iterations that did not converge."""
+    iterations: int = 0
+    residual: float = 0.0
+    """Norm of the preconditioned gradient at the end, relative to the right-hand side's."""
+
+
+def fit_axis(parameters: Floats, knots: Floats, degree: int, weights: Floats | None = None) -> AxisFit:
+    """Factorise the least-squares problem of one axis by QR, never by its normal matrix.
+
+    ``parameters`` (m,) increasing, ``knots`` full, ``weights`` (m,) >= 0 or none. Where the condition passes 1e8
+    (knots that Schoenberg & Whitney allow but that data hardly support) a small second-difference penalty is added. Raises BvbError where there are more control points than data, or the factor would be too large.
+    """
+    m, n = len(parameters), len(knots) - degree - 1
+    if n > m:
+        raise BvbError(f"{n} control points cannot be fitted to {m} data on one axis. Choose at most {m}.")
+    if m * n > LARGEST_FACTOR:
+        raise BvbError(f"{n} control points over {m} data need a factor of {m * n * 8 >> 20} MiB. Choose fewer.")
+    matrix = collocation(knots, degree, parameters)
+    root = np.ones(m) if weights is None else np.sqrt(weights)
+    rows = root[:, None] * matrix.dense()
+    q, r = np.linalg.qr(rows)
+    singular = np.linalg.svd(r, compute_uv=False)
+    condition = float(singular[0] / singular[-1]) if singular[-1] > 0 else np.inf
+    penalised = not condition <= CONDITION_LIMIT
+    if penalised:
+        scale = np.sqrt(PENALTY * np.sum(r * r) / n)
+        differences = np.diff(np.eye(n), min(2, n - 1), axis=0)
+        q, r = np.linalg.qr(np.concatenate([rows, scale * differences]))
+    inverse_r = np.linalg.solve(r, np.eye(n))
+    return AxisFit(matrix, inverse_r @ q[:m].T * root, inverse_r @ inverse_r.T, condition, penalised)
+
+
+def loft(
+    values: Floats, parameters: Sequence[Floats], knots: Sequence[Floats], degrees: Sequence[int]
+) -> FitResult:
+    """Return the least-squares spline to ``values`` (m_1, ..., m_d, c) on a grid, all with equal weight.
+
+    ``parameters`` are the d increasing grid axes (m_a,), ``knots`` d full clamped knot vectors over them.
+    Raises BvbError where the shapes do not match, values are not finite, or an axis has more control points than data.
+    Source: Lee & Park (2008), section 3.2.
+    """
+    _check_data(values, parameters, knots, degrees)
+    axes = [fit_axis(u, t, p) for u, t, p in zip(parameters, knots, degrees, strict=True)]
+    control = _along_all([a.pseudo_inverse for a in axes], values)
+    return FitResult(TensorSpline(degrees, knots, control), tuple(a.condition for a in axes), _penalty_notes(axes))
+
+
+def fit_weighted(
+    values: Floats,
+    weights: Floats,
+    parameters: Sequence[Floats],
+    knots: Sequence[Floats],
+    degrees: Sequence[int],
+    *,
+    start: Floats,
+    project: Callable[[Floats], Floats] = lambda control: control,
+    tolerance: float = 1e-4,
+    max_iterations: int = 200,
+    progress: Callable[[float], None] | None = None,
+) -> FitResult:
+    """Return the spline that minimises sum of weights (V - values)^2 over a grid, among the nets that ``project`` keeps.
+
+    ``weights`` (m_1, ..., m_d) >= 0 need not be separable; data of weight zero have no influence. ``start`` (n_1, ...,
+    n_d, c) is the first net: directions in which the data say nothing keep what it says. ``project`` is an orthogonal
+    projection on nets. Conjugate gradients on A^T W A, preconditioned by the separable inverse that the marginals of
+    W give, until the preconditioned gradient has shrunk to ``tolerance`` of the right-hand side's.
+
+    Raises BvbError as ``loft`` does, and for weights that are negative, not finite or all zero.
+    """
+    _check_data(values, parameters, knots, degrees)
+    if weights.shape != values.shape[:-1] or not np.isfinite(weights).all() or weights.min() < 0 or not weights.any():
+        raise BvbError("Weights must be finite, >= 0, not all zero, and have the shape of the data without channels.")
+    d = len(degrees)
+    axes = []
+    for a in range(d):
+        marginal = weights.mean(axis=tuple(b for b in range(d) if b != a))
+        marginal = np.maximum(marginal / marginal.max(), MARGINAL_FLOOR)
+        axes.append(fit_axis(parameters[a], knots[a], degrees[a], marginal))
+    matrices = [a.matrix for a in axes]
+    inverses = [a.inverse_normal for a in axes]
+
+    right = weights[..., None] * values
+    for a in range(d):
+        right = matrices[a].apply_transposed(right, a)
+    right = project(right)
+
+    def precondition(r: Floats) -> Floats:
+        return project(_along_all(inverses, r))
+
+    x = project(start)
+    r = right - project(_normal(matrices, weights, x))
+    z = precondition(r)
+    direction = z
+    rz = float(np.vdot(r, z))
+    goal = tolerance**2 * float(np.vdot(right, precondition(right)))
+    first, iterations = rz, 0
+    while rz > goal and iterations < max_iterations:
+        image = project(_normal(matrices, weights, direction))
+        alpha = rz / float(np.vdot(direction, image))
+        x = x + alpha * direction
+        r = r - alpha * image
+        z = precondition(r)
+        rz, before = float(np.vdot(r, z)), rz
+        direction = z + (rz / before) * direction
+        iterations += 1
+        if progress is not None:
+            # The gradient falls roughly geometrically, so that its logarithm tells how far the way has come.
+            progress(min(1.0, np.log(first / max(rz, goal)) / max(np.log(first / goal), 1e-9)))
+    notes = _penalty_notes(axes)
+    residual = float(np.sqrt(max(rz, 0.0) / goal)) * tolerance if goal > 0 else 0.0
+    if rz > goal:
+        notes += (f"stopped after {iterations} iterations with the gradient at {residual:.1e} of its scale",)
+    return FitResult(TensorSpline(degrees, knots, x), tuple(a.condition for a in axes), notes, iterations, residual)
+
+
+def _normal(matrices: Sequence[Banded], weights: Floats, x: Floats) -> Floats:
+    """Return A^T W A x: expand all axes but the first, treat that one in a single pass, and go back."""
+    from bvbedit.spline import kernels
+
+    for a in reversed(range(1, len(matrices))):
+        x = matrices[a].apply(x, a)
+    out = np.empty_like(x)
+    first = matrices[0]
+    kernels.weighted_normal(
+        first.first,
+        first.rows,
+        weights.reshape(len(first.rows), -1),
+        x.reshape(first.columns, -1),
+        out.reshape(first.columns, -1),
+    )
+    for a in range(1, len(matrices)):
+        out = matrices[a].apply_transposed(out, a)
+    return out
+
+
+def _along_all(matrices: Sequence[Floats], x: Floats) -> Floats:
+    """Return ``x`` with a dense matrix applied along each axis: the longest contiguous runs, axis 0, first."""
+    for axis, matrix in enumerate(matrices):
+        before, n = int(np.prod(x.shape[:axis])), x.shape[axis]
+        out = matrix @ x.reshape(before, n, -1)
+        x = out.reshape(x.shape[:axis] + (len(matrix),) + x.shape[axis + 1 :])
+    return x
+
+
+def _penalty_notes(axes: Sequence[AxisFit]) -> tuple[str, ...]:
+    return tuple(
+        f"axis {i}: the knots leave the collocation matrix at condition {a.condition:.1e}; "
+        "a small second-difference penalty was added"
+        for i, a in enumerate(axes)
+        if a.penalised
+    )
+
+
+def _check_data(
+    values: Floats, parameters: Sequence[Floats], knots: Sequence[Floats], degrees: Sequence[int]
+) -> None:
+    shape = tuple(len(u) for u in parameters)
+    if not len(parameters) == len(knots) == len(degrees) or values.ndim != len(shape) + 1 or values.shape[:-1] != shape:
+        raise BvbError(f"Data {values.shape} do not lie on a grid of {shape} nodes with {len(degrees)} degrees.")
+    if not np.isfinite(values).all():
+        where = tuple(int(i) for i in np.argwhere(~np.isfinite(values))[0])
+        raise BvbError(f"Datum {where} is {values[where]}. Fill or leave out what is not finite.")
