@@ -73,7 +73,7 @@ class InOut(Chart):
     axes = ("theta_i", "theta_o", "phi")
     degenerate_faces = (DegenerateFace(axis=0, along=2, layers=1), DegenerateFace(axis=1, along=2, layers=1))
     reciprocal = False
-    grid = (np.linspace(0, 1, 91), np.linspace(0, 1, 91), np.linspace(0, 1, 361))
+    grid = (np.arange(91) / 90, np.arange(91) / 90, np.arange(361) / 360)
     hold_order = (0, 1, 2)
 
     def to_parameters(self, wi: Floats, wo: Floats) -> Floats:
@@ -107,7 +107,7 @@ class HalfDiff(Chart):
     axes = ("theta_h", "theta_d", "phi_d")
     degenerate_faces = (DegenerateFace(axis=0, along=2, layers=2), DegenerateFace(axis=1, along=2, layers=1))
     reciprocal = True
-    grid = (np.linspace(0, 1, 91), np.linspace(0, 1, 91), np.linspace(0, 1, 91))
+    grid = (np.arange(91) / 90, np.arange(91) / 90, np.arange(91) / 90)
     hold_order = (1, 0, 2)
 
     def to_parameters(self, wi: Floats, wo: Floats) -> Floats:
@@ -156,7 +156,7 @@ class Rusinkiewicz(Chart):
         bins = round(np.degrees(period))
         self.name, self.period = name, period
         self.reciprocal = bins == 180
-        self.grid = (np.arange(90) / 90.0, np.arange(90) / 90.0, np.arange(bins) / bins)
+        self.grid = (np.arange(90) / 90, np.arange(90) / 90, np.arange(bins) / bins)
 
     def to_parameters(self, wi: Floats, wo: Floats) -> Floats:
         from bvbedit.brdf import chart_kernels

@@ -77,9 +77,7 @@ class MeasuredBrdf(Brdf):
         from bvbedit.brdf import table_kernels
 
         parameters = self.chart.to_parameters(wi, wo)
-        return table_kernels.interpolate(
-            parameters, *self.axes, self.chart.periodic[2], self._logs, self.valid, SCALE
-        )
+        return table_kernels.interpolate(parameters, *self.axes, self.chart.periodic[2], self._logs, self.valid, SCALE)
 
 
 def hold(values: Floats, known: Bools, order: tuple[int, ...]) -> Floats:

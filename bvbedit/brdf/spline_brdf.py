@@ -1,6 +1,6 @@
 """A BRDF as chart + encoding + B-spline volume: the BVB of Lee & Park (2008), with any chart and encoding."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
@@ -49,6 +49,12 @@ class SplineBrdf(Brdf):
     def _evaluate(self, wi: Floats, wo: Floats) -> tuple[Floats, Bools]:
         f = self.encoding.decode(self.spline.evaluate(self.chart.to_parameters(wi, wo)))
         return f, np.ones(len(f), dtype=bool)
+
+
+def payload_bytes(size: Sequence[int], degrees: Sequence[int], precision: str) -> int:
+    """Return the bytes of the control net in ``precision`` and of the interior knots (float64) as a file stores them."""
+    interior = sum(n - p - 1 for n, p in zip(size, degrees, strict=True))
+    return 3 * int(np.prod(size)) * np.dtype(precision).itemsize + 8 * interior
 
 
 def keep_faces(control: Floats, chart: Chart) -> Floats:

@@ -8,6 +8,9 @@ from numba import prange
 from bvbedit.brdf.geometry import Bools, Floats
 from bvbedit.jit import kernel, parallel_kernel
 
+# A node whose share is less is there by rounding, and need not be valid.
+NEGLIGIBLE = 1e-6
+
 
 @parallel_kernel
 def log_table(values: Floats, scale: float) -> Floats:
@@ -71,7 +74,7 @@ def interpolate(
                     red += w * logs[i, j, k, 0]
                     green += w * logs[i, j, k, 1]
                     blue += w * logs[i, j, k, 2]
-                    good = good and (w == 0.0 or valid[i, j, k])
+                    good = good and (w < NEGLIGIBLE or valid[i, j, k])
         f[n, 0] = math.expm1(red) / scale
         f[n, 1] = math.expm1(green) / scale
         f[n, 2] = math.expm1(blue) / scale

@@ -23,7 +23,7 @@ class Banded:
         view, shape = _as_three(x, axis)
         out = np.empty((view.shape[0], len(self.rows), view.shape[2]))
         kernels.apply_banded(self.first, self.rows, view, out)
-        return out.reshape(shape[:axis] + (len(self.rows),) + shape[axis + 1 :])
+        return out.reshape((*shape[:axis], len(self.rows), *shape[axis + 1 :]))
 
     def apply_transposed(self, x: Floats, axis: int) -> Floats:
         """Return the transposed matrix times ``x`` along ``axis``: (..., m, ...) to (..., columns, ...)."""
@@ -32,7 +32,7 @@ class Banded:
         view, shape = _as_three(x, axis)
         out = np.zeros((view.shape[0], self.columns, view.shape[2]))
         kernels.apply_banded_transposed(self.first, self.rows, view, out)
-        return out.reshape(shape[:axis] + (self.columns,) + shape[axis + 1 :])
+        return out.reshape((*shape[:axis], self.columns, *shape[axis + 1 :]))
 
     def dense(self) -> Floats:
         """Return the matrix (m, columns) with its zeros."""

@@ -81,9 +81,7 @@ def fit_axis(parameters: Floats, knots: Floats, degree: int, weights: Floats | N
     return AxisFit(matrix, inverse_r @ q[:m].T * root, inverse_r @ inverse_r.T, condition, penalised)
 
 
-def loft(
-    values: Floats, parameters: Sequence[Floats], knots: Sequence[Floats], degrees: Sequence[int]
-) -> FitResult:
+def loft(values: Floats, parameters: Sequence[Floats], knots: Sequence[Floats], degrees: Sequence[int]) -> FitResult:
     """Return the least-squares spline to ``values`` (m_1, ..., m_d, c) on a grid, all with equal weight.
 
     ``parameters`` are the d increasing grid axes (m_a,), ``knots`` d full clamped knot vectors over them.
@@ -189,7 +187,7 @@ def _along_all(matrices: Sequence[Floats], x: Floats) -> Floats:
     for axis, matrix in enumerate(matrices):
         before, n = int(np.prod(x.shape[:axis])), x.shape[axis]
         out = matrix @ x.reshape(before, n, -1)
-        x = out.reshape(x.shape[:axis] + (len(matrix),) + x.shape[axis + 1 :])
+        x = out.reshape((*x.shape[:axis], len(matrix), *x.shape[axis + 1 :]))
     return x
 
 
@@ -202,9 +200,7 @@ def _penalty_notes(axes: Sequence[AxisFit]) -> tuple[str, ...]:
     )
 
 
-def _check_data(
-    values: Floats, parameters: Sequence[Floats], knots: Sequence[Floats], degrees: Sequence[int]
-) -> None:
+def _check_data(values: Floats, parameters: Sequence[Floats], knots: Sequence[Floats], degrees: Sequence[int]) -> None:
     shape = tuple(len(u) for u in parameters)
     if not len(parameters) == len(knots) == len(degrees) or values.ndim != len(shape) + 1 or values.shape[:-1] != shape:
         raise BvbError(f"Data {values.shape} do not lie on a grid of {shape} nodes with {len(degrees)} degrees.")

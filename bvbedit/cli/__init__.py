@@ -1,0 +1,45 @@
+"""The command line: each command reads files, writes files and prints a short table, or one JSON object."""
+
+import sys
+
+from cyclopts import App
+
+from bvbedit.errors import BvbError
+
+# Plain text help: parsing Markdown would cost a third of the start-up time.
+app = App(
+    name="bvbedit",
+    help="Fit, edit and preview measured BRDFs as B-spline volumes.",
+    help_format="plaintext",
+    version_flags=["--version"],
+)
+# Commands are named by module, so that each pays only for what it imports.
+app.command("bvbedit.cli.models:fit")
+app.command("bvbedit.cli.models:info")
+app.command("bvbedit.cli.models:compare")
+app.command("bvbedit.cli.models:export")
+app.command("bvbedit.cli.pictures:render")
+app.command("bvbedit.cli.pictures:view")
+app.command("bvbedit.cli.samples:sample_app", name="sample")
+app.command("bvbedit.cli.demo:demo")
+
+
+def main() -> None:
+    """Run the command of ``sys.argv``: exit status 0 is done, 1 could not do it, 2 wrong usage."""
+    try:
+        app(result_action="return_value")
+    except BvbError as error:
+        _fail(str(error))
+    except KeyboardInterrupt:
+        _fail("Interrupted. Nothing was left half-written; run the command again.", 130)
+    except BrokenPipeError:
+        # The reader of our output has gone, as `| head` does: nobody is left to tell.
+        sys.stderr.close()
+        sys.exit(1)
+    except MemoryError:
+        _fail("Not enough memory. Ask for less at once, or use a larger machine.")
+
+
+def _fail(message: str, status: int = 1) -> None:
+    print(f"error: {' '.join(message.split())}", file=sys.stderr)
+    sys.exit(status)
