@@ -20,7 +20,10 @@ def _compile(function: F, **options: Any) -> F:
 
 
 def kernel(function: F) -> F:
-    """Compile ``function`` for one thread; kernels may call kernels. Its arguments are taken to be right: nothing is checked inside."""
+    """Compile ``function`` for one thread; kernels may call kernels.
+
+    Its arguments are taken to be right: nothing is checked inside.
+    """
     return _compile(function, nogil=True)
 
 

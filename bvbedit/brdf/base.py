@@ -47,18 +47,23 @@ class Brdf(ABC):
         except ValueError:
             raise BvbError(f"wi {wi.shape} and wo {wo.shape} do not broadcast. Give them compatible shapes.") from None
         shape = wi.shape[:-1]
-        wi, wo = wi.reshape(-1, 3), wo.reshape(-1, 3)
+        f, trusted = self.evaluate_unit(wi.reshape(-1, 3), wo.reshape(-1, 3))
+        return f.reshape(*shape, 3), trusted.reshape(shape)
+
+    def evaluate_unit(self, wi: Floats, wo: Floats) -> tuple[Floats, Bools]:
+        """Return ``evaluate_trusted`` for arrays (n, 3) that are known to hold unit vectors; nothing is checked."""
         f = np.zeros((len(wi), 3))
         trusted = np.zeros(len(wi), dtype=bool)
         lowest = np.cos(self.reliable_elevation)
         for start in range(0, len(wi), BLOCK):
             block = slice(start, start + BLOCK)
             i, o = np.ascontiguousarray(wi[block]), np.ascontiguousarray(wo[block])
-            above = (i[:, 2] >= 0) & (o[:, 2] >= 0)
+            smaller = np.minimum(i[:, 2], o[:, 2])
+            above = smaller >= 0
             if above.all():
                 f[block], backed = self._evaluate(i, o)
-                trusted[block] = backed & (np.minimum(i[:, 2], o[:, 2]) >= lowest)
+                trusted[block] = backed & (smaller >= lowest)
             elif above.any():
                 f[block][above], backed = self._evaluate(i[above], o[above])
-                trusted[block][above] = backed & (np.minimum(i[above, 2], o[above, 2]) >= lowest)
-        return f.reshape(*shape, 3), trusted.reshape(shape)
+                trusted[block][above] = backed & (smaller[above] >= lowest)
+        return f, trusted

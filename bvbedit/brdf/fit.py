@@ -1,5 +1,6 @@
 """Fitting a B-spline volume to any BRDF: sample it on the chart's grid, encode, solve least squares."""
 
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from time import perf_counter
@@ -82,7 +83,7 @@ def fit_net(
         "grid": [len(u) for u in samples.axes],
         "without_data": float(np.mean(samples.weights == 0)),
         "clamped": samples.clamped,
-        "condition": list(result.conditions),
+        "condition": [min(c, sys.float_info.max) for c in result.conditions],
         "iterations": result.iterations,
         "residual": result.residual,
         "notes": list(result.notes),
@@ -101,7 +102,7 @@ def sample(brdf: Brdf, chart: Chart, encoding: Encoding, *, partners: bool = Tru
     """
     if isinstance(brdf, MeasuredBrdf) and brdf.chart is chart:
         weights = brdf.valid & _reliable(brdf, chart)
-        values = encoding.encode(np.minimum(brdf.values, LARGEST_REFLECTANCE))
+        values = encoding.encode(np.minimum(brdf.filled, LARGEST_REFLECTANCE))
         return _checked(Samples(brdf.axes, values, weights.astype(np.float64), brdf.clamped))
     wi, wo = (_off_horizon(w) for w in chart.to_directions(grid_points(chart.grid)))
     pairs = [(wi, wo)]
@@ -110,9 +111,9 @@ def sample(brdf: Brdf, chart: Chart, encoding: Encoding, *, partners: bool = Tru
         pairs.append((wi * mirror, wo * mirror))
         if chart.reciprocal and not brdf.reciprocal:
             pairs += [(o, i) for i, o in pairs]
-    total = measured = count = 0.0
+    total, measured, count = np.zeros((len(wi), 3)), np.zeros((len(wi), 3)), np.zeros(len(wi))
     for i, o in pairs:
-        f, trusted = brdf.evaluate_trusted(i, o)
+        f, trusted = brdf.evaluate_unit(i, o)
         y = encoding.encode(np.minimum(f, LARGEST_REFLECTANCE))
         total, measured, count = total + y, measured + y * trusted[:, None], count + trusted
     shape = tuple(len(u) for u in chart.grid)
@@ -132,7 +133,7 @@ def _reliable(brdf: MeasuredBrdf, chart: Chart) -> Bools:
     """Return which nodes of the table have both directions within the reliable elevation, (n_0, n_1, n_2)."""
     wi, wo = chart.to_directions(grid_points(brdf.axes))
     lowest = np.cos(brdf.reliable_elevation)
-    return (np.minimum(wi[:, 2], wo[:, 2]) >= lowest).reshape(brdf.valid.shape)
+    return np.asarray(np.minimum(wi[:, 2], wo[:, 2]) >= lowest).reshape(brdf.valid.shape)
 
 
 def _off_horizon(w: Floats) -> Floats:

@@ -20,6 +20,7 @@ class MeasuredBrdf(Brdf):
     ``values`` (n_0, n_1, n_2, 3) in 1/sr, linear RGB; ``valid`` (n_0, n_1, n_2); ``axes`` three increasing arrays of
     chart parameters in [0, 1]. What stands in invalid cells is forgotten: they take the value of the nearest valid
     cell below on the first axis of ``chart.hold_order`` (MERL: the next smaller theta_h), or failing that on the next.
+    ``values`` has zeros there, ``filled`` what is evaluated.
     Negative values count as zero; ``clamped`` is their share among the valid ones. The arrays are kept read-only.
 
     Raises BvbError for shapes that do not fit, axes that do not increase, values that are not finite in valid cells,
@@ -44,15 +45,14 @@ class MeasuredBrdf(Brdf):
         count = int(np.count_nonzero(mask))
         if count == 0:
             raise BvbError("Not one cell of the table is valid. There is nothing to evaluate or fit.")
-        bad = ~np.isfinite(table).all(axis=-1) & mask
-        if bad.any():
-            where = tuple(np.argwhere(bad)[0])
-            raise BvbError(f"Table cell {[int(i) for i in where]} holds {table[where].tolist()}. Mark it invalid.")
         if count < mask.size:
-            table = hold(table, mask, chart.hold_order)
-        below = table < 0
-        self.clamped = float(np.count_nonzero(below[mask])) / (3 * count) if below.any() else 0.0
-        if self.clamped or below.any():
+            table[~mask] = 0.0
+        if not np.isfinite(table).all():
+            where = tuple(int(i) for i in np.argwhere(~np.isfinite(table))[0][:3])
+            raise BvbError(f"Table cell {where} holds {table[where].tolist()}. Mark it invalid.")
+        self.clamped = 0.0
+        if table.min() < 0:
+            self.clamped = float(np.count_nonzero(table < 0)) / (3 * count)
             np.maximum(table, 0.0, out=table)
         for a in (table, mask, *nodes):
             a.setflags(write=False)
@@ -67,17 +67,30 @@ class MeasuredBrdf(Brdf):
         return self.chart.reciprocal
 
     @cached_property
-    def _logs(self) -> Floats:
-        from bvbedit.brdf import table_kernels
+    def filled(self) -> Floats:
+        """The table (n_0, n_1, n_2, 3) without holes."""
+        return self.values if self.valid.all() else hold(self.values, self.valid, self.chart.hold_order)
 
-        n = self.values.shape
-        return table_kernels.log_table(self.values.reshape(n[0] * n[1], -1), SCALE).reshape(n)
+    @cached_property
+    def _logs(self) -> Floats:
+        """log(1 + SCALE f), as log(u) x/(u - 1) with u = 1 + x rounded: exact, and numpy's log is quicker than log1p."""
+        x = SCALE * self.filled
+        u = 1.0 + x
+        rounded = u - 1.0
+        np.log(u, out=u)
+        np.divide(u, rounded, out=u, where=rounded != 0)
+        np.copyto(u, 1.0, where=rounded == 0)
+        return np.multiply(u, x, out=u)
 
     def _evaluate(self, wi: Floats, wo: Floats) -> tuple[Floats, Bools]:
         from bvbedit.brdf import table_kernels
 
         parameters = self.chart.to_parameters(wi, wo)
-        return table_kernels.interpolate(parameters, *self.axes, self.chart.periodic[2], self._logs, self.valid, SCALE)
+        logs, valid = table_kernels.interpolate(
+            parameters, *self.axes, self.chart.periodic[2], self._logs, self.valid
+        )
+        # numpy's vector expm1 here, not the scalar one in the kernel: 15 times faster.
+        return np.expm1(logs, out=logs) / SCALE, valid
 
 
 def hold(values: Floats, known: Bools, order: tuple[int, ...]) -> Floats:
@@ -88,16 +101,12 @@ def hold(values: Floats, known: Bools, order: tuple[int, ...]) -> Floats:
     """
     values, known = values.copy(), known.copy()
     for axis in order:
-        if known.all():
-            break
-        n = known.shape[axis]
-        index = np.arange(n).reshape([-1 if a == axis else 1 for a in range(known.ndim)])
-        below = np.maximum.accumulate(np.where(known, index, -1), axis=axis)
-        above = np.flip(np.minimum.accumulate(np.flip(np.where(known, index, n), axis), axis=axis), axis)
-        source = np.where(below >= 0, below, above)
-        fill = ~known & (source < n)
-        at = list(np.nonzero(fill))
-        at[axis] = source[fill]
-        values[fill] = values[tuple(at)]
-        known |= fill
+        v, k = np.moveaxis(values, axis, 0), np.moveaxis(known, axis, 0)
+        upwards = [(i, i - 1) for i in range(1, len(k))]
+        downwards = [(i, i + 1) for i in reversed(range(len(k) - 1))]
+        for i, neighbour in upwards + downwards:
+            fill = k[neighbour] & ~k[i]
+            if fill.any():
+                v[i][fill] = v[neighbour][fill]
+                k[i] |= fill
     return values

@@ -94,7 +94,8 @@ def compare(a: Brdf, b: Brdf, *, stride: int = 1, progress: Callable[[float], No
     node_blocks = list(_node_blocks(b, stride))
     steps = len(theta) + len(node_blocks)
     for i, wi in enumerate(spherical(theta, np.zeros(1))):
-        fa, fb = a.evaluate(wi, wo), b.evaluate(wi, wo)
+        wi_all = np.broadcast_to(wi, wo.shape)
+        fa, fb = a.evaluate_unit(wi_all, wo)[0], b.evaluate_unit(wi_all, wo)[0]
         length = np.linalg.norm(np.minimum(fa, LARGEST_REFLECTANCE) - np.minimum(fb, LARGEST_REFLECTANCE), axis=1)
         distances[i] = length.max(), length.mean()
         if theta[i] <= HIGHEST_ELEVATION + MARGIN:
@@ -102,7 +103,7 @@ def compare(a: Brdf, b: Brdf, *, stride: int = 1, progress: Callable[[float], No
         if progress is not None:
             progress((i + 1) / steps)
     for i, (wi, wo) in enumerate(node_blocks):
-        nodes.add(a.evaluate(wi, wo), b.evaluate(wi, wo), wi[:, 2], wo[:, 2])
+        nodes.add(a.evaluate_unit(wi, wo)[0], b.evaluate_unit(wi, wo)[0], wi[:, 2], wo[:, 2])
         if progress is not None:
             progress((len(theta) + i + 1) / steps)
     paper = PaperErrors(

@@ -1,6 +1,6 @@
 """A BRDF as chart + encoding + B-spline volume: the BVB of Lee & Park (2008), with any chart and encoding."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
@@ -52,7 +52,7 @@ class SplineBrdf(Brdf):
 
 
 def payload_bytes(size: Sequence[int], degrees: Sequence[int], precision: str) -> int:
-    """Return the bytes of the control net in ``precision`` and of the interior knots (float64) as a file stores them."""
+    """Return the bytes of the control net in ``precision`` and of the interior knots (float64) as stored in a file."""
     interior = sum(n - p - 1 for n, p in zip(size, degrees, strict=True))
     return 3 * int(np.prod(size)) * np.dtype(precision).itemsize + 8 * interior
 
@@ -64,14 +64,19 @@ def keep_faces(control: Floats, chart: Chart) -> Floats:
     means one face after the other is exact. A net with a single layer on an axis keeps that one.
     """
     out = np.array(control)
-    for face in chart.degenerate_faces:
-        layers = np.moveaxis(out, face.axis, 0)[: face.layers]
-        # After moveaxis the axis ``along`` stands one place later if it came before the face's own.
-        along = face.along + (face.along < face.axis)
-        layers[:] = layers.mean(axis=(0, along), keepdims=True)
+    for layers, across in _faces(out, chart):
+        layers[:] = layers.mean(axis=across, keepdims=True)
     return out
 
 
 def face_spread(control: Floats, chart: Chart) -> float:
-    """Return how far the net is from ``keep_faces`` of it: the largest difference of a control value."""
-    return float(np.abs(control - keep_faces(control, chart)).max())
+    """Return by how much control points differ (largest difference of a channel) that a degenerate face wants equal."""
+    return max((float(np.ptp(layers, axis=across).max()) for layers, across in _faces(control, chart)), default=0.0)
+
+
+def _faces(control: Floats, chart: Chart) -> Iterator[tuple[Floats, tuple[int, int]]]:
+    """Yield, for each degenerate face, a view of its layers and the axes of that view across which they are equal."""
+    for face in chart.degenerate_faces:
+        # After moveaxis the axis ``along`` stands one place later if it came before the face's own.
+        along = face.along + (face.along < face.axis)
+        yield np.moveaxis(control, face.axis, 0)[: face.layers], (0, along)

@@ -1,6 +1,4 @@
-"""Compiled work on tables: logarithms and multilinear interpolation over three axes."""
-
-import math
+"""Compiled work on tables: multilinear interpolation over three axes."""
 
 import numpy as np
 from numba import prange
@@ -10,16 +8,6 @@ from bvbedit.jit import kernel, parallel_kernel
 
 # A node whose share is less is there by rounding, and need not be valid.
 NEGLIGIBLE = 1e-6
-
-
-@parallel_kernel
-def log_table(values: Floats, scale: float) -> Floats:
-    """Return log(1 + scale values) for ``values`` (n, m)."""
-    out = np.empty_like(values)
-    for i in prange(values.shape[0]):
-        for j in range(values.shape[1]):
-            out[i, j] = math.log1p(scale * values[i, j])
-    return out
 
 
 @kernel
@@ -32,13 +20,13 @@ def bracket(nodes: Floats, x: float, periodic: bool) -> tuple[int, int, float]:
         return last, 0, (x - nodes[last]) / (1.0 + nodes[0] - nodes[last])
     if x <= nodes[0]:
         return 0, 0, 0.0
-    low, high = 0, last
-    while high - low > 1:
-        middle = (low + high) // 2
-        if nodes[middle] <= x:
-            low = middle
-        else:
-            high = middle
+    # Right at once where nodes are equally spaced, as all tables' are; a few steps off where they are nearly so.
+    low = min(int((x - nodes[0]) / (nodes[last] - nodes[0]) * last), last - 1)
+    while x < nodes[low]:
+        low -= 1
+    while x >= nodes[low + 1]:
+        low += 1
+    high = low + 1
     return low, high, (x - nodes[low]) / (nodes[high] - nodes[low])
 
 
@@ -49,12 +37,11 @@ def interpolate(
     axis_1: Floats,
     axis_2: Floats,
     periodic: bool,
-    logs: Floats,
+    table: Floats,
     valid: Bools,
-    scale: float,
 ) -> tuple[Floats, Bools]:
-    """Return f (n, 3), trilinear in the logarithms, and whether all nodes that take part are valid (n,)."""
-    f = np.empty((len(parameters), 3))
+    """Return trilinear means (n, 3) of ``table`` (n_0, n_1, n_2, 3), and whether all nodes that take part are valid."""
+    means = np.empty((len(parameters), 3))
     trusted = np.empty(len(parameters), dtype=np.bool_)
     for n in prange(len(parameters)):
         i0, i1, s = bracket(axis_0, parameters[n, 0], False)
@@ -71,12 +58,10 @@ def interpolate(
                 for c in range(2):
                     k = k1 if c else k0
                     w = wb * (r if c else 1.0 - r)
-                    red += w * logs[i, j, k, 0]
-                    green += w * logs[i, j, k, 1]
-                    blue += w * logs[i, j, k, 2]
+                    red += w * table[i, j, k, 0]
+                    green += w * table[i, j, k, 1]
+                    blue += w * table[i, j, k, 2]
                     good = good and (w < NEGLIGIBLE or valid[i, j, k])
-        f[n, 0] = math.expm1(red) / scale
-        f[n, 1] = math.expm1(green) / scale
-        f[n, 2] = math.expm1(blue) / scale
+        means[n, 0], means[n, 1], means[n, 2] = red, green, blue
         trusted[n] = good
-    return f, trusted
+    return means, trusted

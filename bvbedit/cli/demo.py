@@ -142,7 +142,8 @@ def _report(description: str, rows: dict[str, Any], errors: dict[str, Any], draw
     lines = [
         f"# {MATERIAL}",
         "",
-        f"{description}. Measured by a simulated goniophotometer on MERL's grid with {NOISE:.0%} noise and fitted twice.",
+        f"{description}.",
+        f"Measured by a simulated goniophotometer on MERL's grid with {NOISE:.0%} noise, and fitted twice.",
         "",
         row("", [r["label"] for r in rows.values()]),
         row("---", ["---"] * len(rows)),

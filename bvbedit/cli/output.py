@@ -1,6 +1,7 @@
 """What commands print: a short table for people or one JSON object, and progress on standard error."""
 
 import json
+import math
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -8,9 +9,9 @@ from typing import Any
 
 
 def report(result: Mapping[str, Any], as_json: bool) -> None:
-    """Print ``result`` on standard output: exactly one JSON object, or a table of its entries, nested ones flattened."""
+    """Print ``result`` on standard output: one JSON object, or a table of its entries, nested ones flattened."""
     if as_json:
-        print(json.dumps(result, allow_nan=False, default=_plain))
+        print(json.dumps(_plain(result), allow_nan=False))
         return
     rows = list(_flatten(result))
     width = max(len(name) for name, _ in rows)
@@ -43,10 +44,16 @@ def _text(value: Any) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Turn numpy's scalars and arrays into what JSON knows."""
+    """Turn mappings, sequences, numpy's scalars and paths into what JSON knows; infinity and nan become null."""
+    if isinstance(value, Mapping):
+        return {str(k): _plain(v) for k, v in value.items()}
     if hasattr(value, "tolist"):
-        return value.tolist()
-    return str(value)
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        return [_plain(v) for v in value]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value if value is None or isinstance(value, str | int) else str(value)
 
 
 @contextmanager

@@ -59,7 +59,8 @@ def fit_axis(parameters: Floats, knots: Floats, degree: int, weights: Floats | N
     """Factorise the least-squares problem of one axis by QR, never by its normal matrix.
 
     ``parameters`` (m,) increasing, ``knots`` full, ``weights`` (m,) >= 0 or none. Where the condition passes 1e8
-    (knots that Schoenberg & Whitney allow but that data hardly support) a small second-difference penalty is added. Raises BvbError where there are more control points than data, or the factor would be too large.
+    (knots that Schoenberg & Whitney allow but that data hardly support) a small second-difference penalty is added.
+    Raises BvbError where there are more control points than data, or the factor would be too large.
     """
     m, n = len(parameters), len(knots) - degree - 1
     if n > m:
@@ -107,7 +108,7 @@ def fit_weighted(
     max_iterations: int = 200,
     progress: Callable[[float], None] | None = None,
 ) -> FitResult:
-    """Return the spline that minimises sum of weights (V - values)^2 over a grid, among the nets that ``project`` keeps.
+    """Return the spline that minimises sum weights (V - values)^2 over a grid, among the nets that ``project`` keeps.
 
     ``weights`` (m_1, ..., m_d) >= 0 need not be separable; data of weight zero have no influence. ``start`` (n_1, ...,
     n_d, c) is the first net: directions in which the data say nothing keep what it says. ``project`` is an orthogonal
@@ -159,7 +160,9 @@ def fit_weighted(
     residual = float(np.sqrt(max(rz, 0.0) / goal)) * tolerance if goal > 0 else 0.0
     if rz > goal:
         notes += (f"stopped after {iterations} iterations with the gradient at {residual:.1e} of its scale",)
-    return FitResult(TensorSpline(degrees, knots, x), tuple(a.condition for a in axes), notes, iterations, residual)
+    # Rounding has drifted from what ``project`` keeps.
+    spline = TensorSpline(degrees, knots, project(x))
+    return FitResult(spline, tuple(a.condition for a in axes), notes, iterations, residual)
 
 
 def _normal(matrices: Sequence[Banded], weights: Floats, x: Floats) -> Floats:

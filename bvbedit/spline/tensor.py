@@ -167,7 +167,10 @@ class TensorSpline:
     def _evaluate_cubic_rgb(self, x: Floats, out: Floats) -> None:
         from bvbedit.spline import kernels
 
-        kernels.evaluate_cubic_rgb(x, *self.knots, *self._bins, *self._polynomials, self.control, out)
+        t0, t1, t2 = self.knots
+        b0, b1, b2 = self._bins
+        p0, p1, p2 = self._polynomials
+        kernels.evaluate_cubic_rgb(x, t0, t1, t2, b0, b1, b2, p0, p1, p2, self.control, out)
 
     def _evaluate_any(self, x: Floats, out: Floats) -> None:
         from bvbedit.spline import kernels

@@ -1,0 +1,121 @@
+"""Lobes: f(wi, wo) over all wo at one theta_i, drawn in spherical coordinates (Lee & Park 2008, Fig. 2).
+
+The radius is the length of the colour vector, compressed by a scale; the colour is the colour. Pure functions that
+return PyVista meshes; no window is opened here. Light comes from the -x side: wi = (-sin theta_i, 0, cos theta_i).
+"""
+
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bvbedit.brdf.base import Brdf
+from bvbedit.brdf.encodings import Encoding, Linear, Root
+from bvbedit.brdf.geometry import Floats, spherical
+
+if TYPE_CHECKING:
+    from pyvista import PolyData
+
+# The names of the point arrays of a lobe: its colour (sRGB bytes) and the length of the colour vector (1/sr).
+COLOUR = "colour"
+LENGTH = "length"
+# Above this ratio of the longest radius to the median a linear lobe is a needle on a dot.
+LINEAR_RANGE = 20.0
+# Half of the great circles leave the mirror direction at equal angles, half reach the horizon in equal steps: seen from
+# just above it, nearly all of the horizon lies within a few degrees of sideways.
+CIRCLES = 400
+# Fractions of the way from the mirror direction to the horizon: 1 degree steps or finer nearly everywhere, and 64
+# more in geometric progression towards the mirror direction, the first at 0.002 to 0.02 degrees. Chrome's lobe is half
+# a degree wide.
+FRACTIONS = np.union1d(np.linspace(0, 1, 121), np.geomspace(1e-4, 0.12, 64))
+
+
+def mirror_mesh(theta_i: float) -> tuple[Floats, NDArray[np.int64]]:
+    """Return unit vectors (n, 3) that cover the upper hemisphere, and the triangles (m, 3) between them.
+
+    The mesh is polar about the mirror direction of ``theta_i`` (radians, below pi/2), vertex 0, and densest there; its
+    rim is the horizon.
+    """
+    mirror, across = spherical(theta_i, 0.0), np.array([0.0, 1.0, 0.0])
+    # Towards the retro-reflective side; mirror, across and up are right-handed, so that triangles face outwards.
+    up = np.cross(mirror, across)
+    half = np.arange(0, CIRCLES, 2) * (2 * np.pi / CIRCLES)
+    rim = spherical(np.pi / 2, half + np.pi / CIRCLES)
+    beta = np.sort(np.concatenate([half, np.arctan2(rim @ up, rim @ across) % (2 * np.pi)]))
+    tangent = np.cos(beta)[:, None] * across + np.sin(beta)[:, None] * up
+    # Along each great circle from the mirror direction, z = cos a mirror_z + sin a tangent_z falls to zero once.
+    horizon = np.arctan2(mirror[2], -tangent[:, 2])
+    angle = FRACTIONS[1:, None] * horizon
+    rings = np.cos(angle)[..., None] * mirror + np.sin(angle)[..., None] * tangent
+    rings[-1, :, 2] = 0.0
+    directions = np.concatenate([mirror[None], rings.reshape(-1, 3)])
+
+    here = np.arange(CIRCLES)
+    there = (here + 1) % CIRCLES
+    fan = np.stack([np.zeros_like(here), 1 + here, 1 + there], axis=-1)
+    inner = 1 + CIRCLES * np.arange(len(rings) - 1)[:, None]
+    a, b, c, d = inner + here, inner + there, inner + CIRCLES + here, inner + CIRCLES + there
+    bands = np.stack([np.stack([a, c, d], axis=-1), np.stack([a, d, b], axis=-1)], axis=2)
+    return directions, np.concatenate([fan, bands.reshape(-1, 3)]).astype(np.int64)
+
+
+def lobe(brdf: Brdf, theta_i: float) -> "PolyData":
+    """Return the lobe of ``brdf`` at ``theta_i`` (radians, below pi/2), uncompressed: radius in 1/sr.
+
+    Point arrays: ``LENGTH`` (n,) the length of f in 1/sr; ``COLOUR`` (n, 3) sRGB bytes of its colour, the largest
+    channel at full brightness.
+    """
+    import pyvista as pv
+
+    wo, triangles = mirror_mesh(theta_i)
+    f = brdf.evaluate(spherical(theta_i, np.pi), wo)
+    length = np.linalg.norm(f, axis=-1)
+    mesh: pv.PolyData = pv.PolyData.from_regular_faces(wo * length[:, None], cast(Any, triangles))
+    mesh.point_data[LENGTH] = length
+    mesh.point_data[COLOUR] = true_colour(f)
+    mesh.point_data["direction"] = wo
+    return mesh
+
+
+def scaled(mesh: "PolyData", scale: Encoding, peak: float) -> "PolyData":
+    """Return a ``lobe`` with radius scale(length)/scale(peak), cut where it exceeds ``peak`` (1/sr, positive)."""
+    out = mesh.copy()
+    length = np.minimum(np.asarray(mesh.point_data[LENGTH]), peak)
+    radius = scale.encode(length) / scale.encode(np.array(peak))
+    out.points = np.asarray(mesh.point_data["direction"]) * radius[:, None]
+    return out
+
+
+def fitting_scale(mesh: "PolyData") -> Encoding:
+    """Return the scale that shows a ``lobe`` whole: linear, or the cube root where the dynamic range is large."""
+    length = np.asarray(mesh.point_data[LENGTH])
+    return Linear() if length.max() <= LINEAR_RANGE * np.median(length) else Root()
+
+
+def true_colour(f: Floats) -> NDArray[np.uint8]:
+    """Return sRGB bytes (n, 3) of linear RGB ``f`` (n, 3) >= 0, the largest channel at full brightness; black stays."""
+    from bvbedit.render.tonemap import tone_map
+
+    largest = f.max(axis=-1, keepdims=True)
+    return np.asarray(tone_map((f / np.where(largest > 0, largest, 1.0))[None])[0])
+
+
+def rings(scale: Encoding, peak: float) -> list[tuple[float, float]]:
+    """Return (length in 1/sr, radius) of two round lengths up to ``peak``, for a ground grid."""
+    highest = 10.0 ** np.floor(np.log10(peak))
+    highest *= max(m for m in (1, 2, 5) if m * highest <= peak * (1 + 1e-12))
+    # Under a cube root a tenth of the length has 46 % of the radius.
+    lengths = highest * np.array([1.0, 0.5 if isinstance(scale, Linear) else 0.1])
+    radii = scale.encode(lengths) / scale.encode(np.array(peak))
+    return list(zip(lengths.tolist(), radii.tolist(), strict=True))
+
+
+def hides(mesh: "PolyData", point: Floats, eye: Floats) -> bool:
+    """Return whether ``mesh`` stands between ``point`` (3,) and a viewer far away in the direction ``eye`` (3,).
+
+    Judged by the vertices alone, which in a lobe of radius 1 stand closer than the 0.03 that count as a hit.
+    """
+    away = np.asarray(mesh.points) - point
+    towards = eye / np.linalg.norm(eye)
+    depth = away @ towards
+    return bool(((depth > 0) & (np.linalg.norm(away - depth[:, None] * towards, axis=-1) < 0.03)).any())

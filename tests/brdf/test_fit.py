@@ -1,0 +1,321 @@
+"""Fitting a model: against dense algebra, blind to what was not measured, single-valued at the poles, reciprocal."""
+
+import functools
+import json
+
+import numpy as np
+import pytest
+
+from bvbedit import BvbError
+from bvbedit.brdf.base import Brdf
+from bvbedit.brdf.charts import HALF_DIFF, IN_OUT, RUSINKIEWICZ, Chart, grid_points
+from bvbedit.brdf.encodings import Encoding, Linear, Log, Root
+from bvbedit.brdf.fit import LARGEST_REFLECTANCE, fit_net, sample
+from bvbedit.brdf.geometry import spherical
+from bvbedit.brdf.measured import MeasuredBrdf
+from bvbedit.brdf.spline_brdf import SplineBrdf, face_spread, keep_faces
+from bvbedit.spline.knots import place_knots
+from bvbedit.spline.tensor import TensorSpline
+from tests.brdf.samples import Glossy, nearby, random_pairs
+from tests.spline import naive
+
+
+@functools.cache
+def _noisy_table() -> MeasuredBrdf:
+    """A glossy material on MERL's grid with 10 % noise in each cell, invalid where a direction is below the horizon."""
+    rng = np.random.default_rng(1)
+    wi, wo = RUSINKIEWICZ.to_directions(grid_points(RUSINKIEWICZ.grid))
+    f = Glossy().evaluate(wi, wo) * (1 + 0.1 * rng.normal(size=(len(wi), 3)))
+    valid = (wi[:, 2] > 0) & (wo[:, 2] > 0)
+    shape = tuple(len(a) for a in RUSINKIEWICZ.grid)
+    return MeasuredBrdf(f.reshape(*shape, 3), valid.reshape(shape), RUSINKIEWICZ.grid, RUSINKIEWICZ)
+
+
+def _small_table(chart: Chart, rng: np.random.Generator, valid: float = 1.0, garbage: float = 0.0) -> MeasuredBrdf:
+    """A noisy glossy material on a coarse grid of the chart itself; ``garbage`` stands in cells that are not valid."""
+    axes = tuple(np.linspace(0, 1, n) for n in (25, 23, 21))
+    wi, wo = (np.abs(w) for w in chart.to_directions(grid_points(axes)))
+    f = Glossy(0.4).evaluate(wi, wo) * (1 + 0.05 * rng.normal(size=(len(wi), 3)))
+    mask = rng.uniform(size=len(wi)) < valid
+    f[~mask] = garbage
+    return MeasuredBrdf(f.reshape(25, 23, 21, 3), mask.reshape(25, 23, 21), axes, chart)
+
+
+@functools.cache
+def _model(what: str, encoding: Encoding, size: tuple[int, int, int]) -> SplineBrdf:
+    brdf: Brdf = {"glossy": Glossy(), "noisy": _noisy_table()}[what]
+    return fit_net(brdf, HALF_DIFF, encoding, size=size)
+
+
+each_half_diff_model = pytest.mark.parametrize(
+    ("what", "encoding", "size"),
+    [
+        ("glossy", Root(), (20, 12, 8)),
+        ("glossy", Log(), (8, 8, 8)),
+        ("noisy", Root(), (20, 12, 8)),
+        ("noisy", Log(), (40, 10, 10)),
+    ],
+)
+
+
+def _relative_spread(f: np.ndarray) -> float:
+    return float((np.ptp(f, axis=0) / f.max(axis=0)).max())
+
+
+@each_half_diff_model
+@pytest.mark.parametrize("theta_d", [0.0, 1e-4, 0.1, 0.7, 1.2, 1.45])
+def test_around_the_pole_h_equals_n_a_model_has_one_value(what, encoding, size, theta_d, rng):
+    """All azimuths meet where h = n: pairs within 1e-9 rad of one another are to differ by less than a millionth."""
+    wi, wo = spherical(theta_d, 0.3), spherical(theta_d, 0.3 + np.pi)
+    f = _model(what, encoding, size).evaluate(nearby(rng, wi, 1000, 1e-9), nearby(rng, wo, 1000, 1e-9))
+    assert f.min() > 0
+    assert _relative_spread(f) < 1e-6
+
+
+@each_half_diff_model
+@pytest.mark.parametrize("theta_h", [0.0, 1e-4, 0.1, 0.7, 1.2, 1.45])
+def test_around_retro_reflection_a_model_has_one_value(what, encoding, size, theta_h, rng):
+    w = spherical(theta_h, 0.3)
+    f = _model(what, encoding, size).evaluate(nearby(rng, w, 1000, 1e-9), nearby(rng, w, 1000, 1e-9))
+    assert f.min() > 0
+    assert _relative_spread(f) < 1e-6
+
+
+@each_half_diff_model
+def test_degenerate_faces_are_constant_in_the_net(what, encoding, size):
+    control = _model(what, encoding, size).spline.control
+    assert face_spread(control, HALF_DIFF) <= 1e-12 * np.abs(control).max()
+    assert np.ptp(control[:2], axis=(0, 2)).max() <= 1e-12 * np.abs(control).max()
+    assert np.ptp(control[:, 0], axis=1).max() <= 1e-12 * np.abs(control).max()
+
+
+@each_half_diff_model
+def test_half_diff_models_are_reciprocal_to_rounding(what, encoding, size, rng):
+    model = _model(what, encoding, size)
+    wi, wo = random_pairs(rng, 20_000)
+    np.testing.assert_allclose(model.evaluate(wi, wo), model.evaluate(wo, wi), rtol=1e-13)
+
+
+@each_half_diff_model
+def test_models_are_near_what_they_were_fitted_to(what, encoding, size, rng):
+    wi, wo = random_pairs(rng, 20_000, np.radians(75))
+    model, truth = _model(what, encoding, size).evaluate(wi, wo), Glossy().evaluate(wi, wo)
+    logs = np.log(1 + model) - np.log(1 + truth)
+    assert np.sqrt(np.mean(logs**2)) < (0.06 if size[0] < 20 else 0.02)
+
+
+@pytest.mark.parametrize("encoding", [Root(), Log(), Linear()], ids=repr)
+def test_in_out_models_have_one_value_at_normal_incidence(encoding, rng):
+    model = fit_net(_small_table(IN_OUT, rng), IN_OUT, encoding, size=(9, 8, 7))
+    control = model.spline.control
+    assert face_spread(control, IN_OUT) <= 1e-12 * np.abs(control).max()
+    n = np.array([0.0, 0.0, 1.0])
+    for theta in (0.0, 0.4, 1.2):
+        w = spherical(theta, 0.3)
+        for pair in ((n, w), (w, n)):
+            f = model.evaluate(nearby(rng, pair[0], 1000, 1e-9), nearby(rng, pair[1], 1000, 1e-9))
+            assert _relative_spread(f) < 1e-6
+
+
+def test_the_published_configuration_is_the_papers_least_squares_solution(rng):
+    """Lee & Park (2008): n x n x 4n on a table of 91 x 91 x 361, each axis solved densely with a naive basis."""
+    axes = IN_OUT.grid
+    theta_i, theta_o, phi = (a[:, None] * s for a, s in zip(axes, (np.pi / 2, np.pi / 2, np.pi), strict=True))
+    smooth = np.exp(-(((theta_i - theta_o[:, 0]) / 0.2) ** 2))[:, :, None] * (1 - np.cos(phi[:, 0])) ** 3
+    values = 0.1 + smooth[..., None] * np.array([1.0, 0.6, 0.3]) * (1 + 0.1 * rng.uniform(size=(91, 91, 361, 3)))
+    table = MeasuredBrdf(values, np.ones((91, 91, 361), bool), axes, IN_OUT)
+    model = fit_net(table, IN_OUT, Linear(), size=(20, 20, 80), knots="piegl-tiller")
+    expected = values
+    for axis, size in enumerate((20, 20, 80)):
+        u, n, p = axes[axis], size - 1, 3
+        d = len(u) / (n - p + 1)
+        interior = []
+        for j in range(1, n - p + 1):
+            i = int(j * d)
+            interior.append((1 - (j * d - i)) * u[i - 1] + (j * d - i) * u[i])
+        t = np.array([0.0] * 4 + interior + [1.0] * 4)
+        np.testing.assert_allclose(model.spline.knots[axis], t, rtol=0, atol=1e-14)
+        rows = np.moveaxis(expected, axis, 0)
+        solved = np.linalg.lstsq(naive.matrix(t, 3, u), rows.reshape(len(u), -1), rcond=None)[0]
+        expected = np.moveaxis(solved.reshape(size, *rows.shape[1:]), 0, axis)
+    assert model.spline.size == (20, 20, 80)
+    np.testing.assert_allclose(model.spline.control, expected, rtol=0, atol=1e-10 * np.abs(expected).max())
+    assert model.report["solver"] == "lofting"
+    assert model.report["iterations"] == 0
+
+
+@pytest.mark.parametrize("chart", [HALF_DIFF, IN_OUT, RUSINKIEWICZ], ids=lambda c: c.name)
+@pytest.mark.parametrize("garbage", [1e300, -1.0, np.nan])
+def test_what_stands_in_invalid_cells_has_no_influence_on_the_model(chart, garbage):
+    models = [
+        fit_net(
+            _small_table(chart, np.random.default_rng(5), valid=0.7, garbage=g),
+            IN_OUT if chart is IN_OUT else HALF_DIFF,
+            Root(),
+            size=(7, 6, 5),
+        )
+        for g in (0.0, garbage)
+    ]
+    np.testing.assert_array_equal(models[0].spline.control, models[1].spline.control)
+
+
+def test_cells_near_grazing_have_no_influence_either(rng):
+    """Beyond the reliable elevation a measurement is extrapolated; it carries no weight, but the model stays finite."""
+    axes = tuple(np.linspace(0, 1, 25) for _ in range(3))
+    wi, wo = IN_OUT.to_directions(grid_points(axes))
+    f = Glossy(0.4).evaluate(wi, wo).reshape(25, 25, 25, 3)
+    grazing = (np.minimum(wi[:, 2], wo[:, 2]) < np.cos(np.radians(85))).reshape(25, 25, 25)
+    models = []
+    for level in (0.0, 1e4):
+        values = np.where(grazing[..., None], level, f)
+        table = MeasuredBrdf(values, np.ones(grazing.shape, bool), axes, IN_OUT)
+        models.append(fit_net(table, IN_OUT, Root(), size=(8, 8, 8)))
+    wi, wo = random_pairs(rng, 5000, np.radians(80))
+    first, second = (m.evaluate(wi, wo) for m in models)
+    np.testing.assert_allclose(first, second, rtol=0, atol=2e-3 * first.max())
+    assert models[0].report["without_data"] == pytest.approx(grazing.mean())
+
+
+@pytest.mark.parametrize("encoding", [Root(), Log(), Linear()], ids=repr)
+@pytest.mark.parametrize("chart", [IN_OUT, HALF_DIFF], ids=lambda c: c.name)
+def test_a_model_fitted_in_its_own_space_comes_back(chart, encoding, rng):
+    """Up to the 1e-4 rad from which the horizon is looked at, and the tolerance of the iteration."""
+    size = (8, 7, 6)
+    knots = [place_knots("averaged", u, n, 3) for u, n in zip(chart.grid, size, strict=True)]
+    control = rng.uniform(0.5, 1.5, (*size, 3))
+    if chart is HALF_DIFF:
+        control[-1] = 1.0  # theta_h = pi/2: both directions lie in the surface
+    model = SplineBrdf(TensorSpline((3, 3, 3), knots, keep_faces(control, chart)), chart, encoding)
+    again = fit_net(model, chart, encoding, size=size)
+    for ours, theirs in zip(again.spline.knots, knots, strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+    wi, wo = random_pairs(rng, 20_000, np.radians(80))
+    np.testing.assert_allclose(again.evaluate(wi, wo), model.evaluate(wi, wo), rtol=2e-3)
+
+
+def test_a_table_of_a_model_gives_the_model_back(rng):
+    """On the chart's own nodes, where nothing is resampled, up to the tolerance of the iteration."""
+    axes = tuple(np.linspace(0, 1, 31) for _ in range(3))
+    knots = [place_knots("averaged", u, n, 3) for u, n in zip(axes, (8, 7, 6), strict=True)]
+    control = keep_faces(rng.uniform(0.5, 1.5, (8, 7, 6, 3)), HALF_DIFF)
+    spline = TensorSpline((3, 3, 3), knots, control)
+    table = MeasuredBrdf(Root().decode(spline.evaluate_grid(axes)), np.ones((31, 31, 31), bool), axes, HALF_DIFF)
+    again = fit_net(table, HALF_DIFF, Root(), size=(8, 7, 6))
+    points = rng.uniform(0, 0.8, (2000, 3))
+    np.testing.assert_allclose(again.spline.evaluate(points), spline.evaluate(points), rtol=0, atol=5e-3)
+
+
+def test_samples_are_means_over_the_pairs_that_the_chart_folds():
+    """A BRDF that is neither mirror-symmetric nor reciprocal: four pairs stand behind each node of half-diff."""
+
+    class Skewed(Brdf):
+        def _evaluate(self, wi, wo):
+            skew = 1 + wi[:, 0] * wo[:, 1] - wi[:, 1] * wo[:, 0]
+            return np.stack([skew, wi[:, 2], 1 + wi[:, 1]], axis=-1), wi[:, 1] >= 0
+
+    wi, wo = HALF_DIFF.to_directions(grid_points(HALF_DIFF.grid))
+    samples = sample(Skewed(), HALF_DIFF, Linear())
+    values, weights = samples.values.reshape(-1, 3), samples.weights.ravel()
+    inside = (np.minimum(wi[:, 2], wo[:, 2]) > np.cos(np.radians(89))) & (wi[:, 1] > 1e-9)
+    # wi.y > 0 is trusted, which of wi, wo, mirrored wi and mirrored wo holds for two: of wi and of the mirrored wo.
+    np.testing.assert_allclose(weights[inside], 0.5, atol=1e-15)
+    cross = (wi[:, 0] * wo[:, 1] - wi[:, 1] * wo[:, 0])[inside]
+    np.testing.assert_allclose(values[inside, 0], 1 + cross, atol=1e-12)
+    np.testing.assert_allclose(values[inside, 1], 0.5 * (wi[inside, 2] + wo[inside, 2]), atol=1e-12)
+    np.testing.assert_allclose(values[inside, 2], 1 + 0.5 * (wi[inside, 1] - wo[inside, 1]), atol=1e-12)
+
+
+def test_a_table_on_the_chart_is_taken_at_its_own_nodes(rng):
+    table = _small_table(HALF_DIFF, rng, valid=0.8)
+    samples = sample(table, HALF_DIFF, Log())
+    assert samples.axes is table.axes
+    np.testing.assert_array_equal(samples.values[table.valid], Log().encode(table.values[table.valid]))
+    assert (samples.weights[~table.valid] == 0).all()
+    wi, wo = HALF_DIFF.to_directions(grid_points(table.axes))
+    reliable = (np.minimum(wi[:, 2], wo[:, 2]) >= np.cos(np.radians(85))).reshape(table.valid.shape)
+    np.testing.assert_array_equal(samples.weights > 0, table.valid & reliable)
+
+
+def test_extreme_tables_are_fitted_without_overflow():
+    axes = tuple(np.linspace(0, 1, 15) for _ in range(3))
+    values = np.full((15, 15, 15, 3), 1e-5)
+    values[0, :, :] = 1e300
+    values[3, 5, 7] = 0.0
+    table = MeasuredBrdf(values, np.ones((15, 15, 15), bool), axes, HALF_DIFF)
+    for encoding in (Linear(), Root(), Log()):
+        model = fit_net(table, HALF_DIFF, encoding, size=(8, 6, 5))
+        peak = model.evaluate([0.3, 0, 1], [-0.3, 0, 1])
+        assert np.isfinite(model.spline.control).all()
+        assert (peak < 2 * LARGEST_REFLECTANCE).all()
+        assert (peak > 0.05 * LARGEST_REFLECTANCE).all()
+
+
+@pytest.mark.parametrize("encoding", [Linear(), Root(), Log()], ids=repr)
+def test_black_stays_black(encoding):
+    axes = tuple(np.linspace(0, 1, 12) for _ in range(3))
+    table = MeasuredBrdf(np.zeros((12, 12, 12, 3)), np.ones((12, 12, 12), bool), axes, HALF_DIFF)
+    model = fit_net(table, HALF_DIFF, encoding, size=(5, 5, 5))
+    assert np.abs(model.spline.control).max() == 0
+
+
+@pytest.mark.parametrize(("size", "degrees"), [((4, 4, 4), (3, 3, 3)), ((1, 1, 1), (0, 0, 0)), ((25, 23, 21), (3, 2, 1))])
+def test_the_smallest_and_the_largest_net_that_the_data_carry(size, degrees, rng):
+    table = _small_table(HALF_DIFF, rng)
+    model = fit_net(table, HALF_DIFF, Root(), size=size, degrees=degrees)
+    assert model.spline.size == size
+    assert model.spline.degrees == degrees
+    assert np.isfinite(model.evaluate(*random_pairs(rng, 100))).all()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ({"size": (8, 8)}, "three numbers"),
+        ({"size": (8, 8, 8), "degrees": (3, 3)}, "three numbers"),
+        ({"size": (3, 8, 8)}, "3 control points"),
+        ({"size": (8, 8, 22)}, "22 control points"),
+        ({"size": (8, 8, 8), "degrees": (3, 17, 3)}, "Degree 17"),
+        ({"size": (8, 8, 8), "knots": "even"}, "even"),
+    ],
+)
+def test_impossible_requests_are_refused(arguments, says, rng):
+    with pytest.raises(BvbError, match=says):
+        fit_net(_small_table(HALF_DIFF, rng), HALF_DIFF, Root(), **arguments)
+
+
+def test_a_table_valid_at_grazing_alone_is_refused():
+    axes = tuple(np.linspace(0, 1, 31) for _ in range(3))
+    valid = np.zeros((31, 31, 31), bool)
+    valid[-1] = True
+    with pytest.raises(BvbError, match="grazing"):
+        fit_net(MeasuredBrdf(np.ones((31, 31, 31, 3)), valid, axes, IN_OUT), IN_OUT, Root(), size=(5, 5, 5))
+
+
+def test_the_report_says_what_was_done_in_json(rng):
+    table = _small_table(IN_OUT, rng, valid=0.75)
+    steps: list[float] = []
+    model = fit_net(table, IN_OUT, Root(), size=(8, 7, 6), progress=steps.append)
+    report = json.loads(json.dumps(dict(model.report), allow_nan=False))
+    assert report["knots"] == "averaged"
+    assert report["solver"] == "weighted"
+    assert report["grid"] == [25, 23, 21]
+    assert len(report["condition"]) == 3
+    assert min(report["condition"]) >= 1
+    assert report["notes"] == []
+    assert report["seconds"] > 0
+    assert report["iterations"] == len(steps)
+    samples = sample(table, IN_OUT, Root())
+    assert report["without_data"] == pytest.approx((samples.weights == 0).mean())
+
+
+def test_knots_that_the_data_hardly_support_are_confessed_in_the_report(rng):
+    model = fit_net(_small_table(HALF_DIFF, rng), HALF_DIFF, Root(), size=(25, 8, 8), knots="piegl-tiller")
+    notes = json.loads(json.dumps(dict(model.report), allow_nan=False))["notes"]
+    assert any("axis 0" in n and "penalty" in n for n in notes)
+    assert np.isfinite(model.spline.control).all()
+
+
+def test_a_fit_is_the_same_every_time(rng):
+    table = _small_table(HALF_DIFF, rng, valid=0.8)
+    first, second = (fit_net(table, HALF_DIFF, Root(), size=(8, 7, 6)).spline.control for _ in range(2))
+    np.testing.assert_array_equal(first, second)

@@ -1,0 +1,230 @@
+"""The command line as a user meets it: files in, files out, one JSON object, exit status 0, 1 or 2."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import bvbedit
+from bvbedit.cli import main
+
+
+@pytest.fixture
+def run(monkeypatch, capsys):
+    """Run a command in this process; return (status, stdout, stderr)."""
+
+    def call(*arguments):
+        monkeypatch.setattr(sys, "argv", ["bvbedit", *map(str, arguments)])
+        status = 0
+        try:
+            main()
+        except SystemExit as stop:
+            status = stop.code or 0
+        out, err = capsys.readouterr()
+        return status, out, err
+
+    return call
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder with a MERL table, a table on the paper's grid and a model."""
+    from bvbedit.brdf.goniophotometer import measure
+    from bvbedit.brdf.materials import material_named
+
+    home = tmp_path_factory.mktemp("files")
+    table = measure(material_named("satin-paint").brdf, "merl", noise=0.01, seed=3)
+    bvbedit.save(table, home / "satin.binary")
+    bvbedit.save(bvbedit.fit(table, size=(12, 8, 5)), home / "satin.bvb")
+    return home
+
+
+def one_object(out):
+    assert out.count("\n") == 1
+    return json.loads(out)
+
+
+def test_fit_writes_a_model_and_tells_what_the_contract_lists(run, folder, tmp_path):
+    target = tmp_path / "model.bvb"
+    status, out, err = run("fit", folder / "satin.binary", target, "--size", "10,6,4", "--json")
+    assert (status, err) == (0, "")
+    told = one_object(out)
+    keys = "file file_bytes payload_bytes chart encoding degrees size knots condition seconds metrics".split()
+    assert set(keys) <= set(told)
+    assert told["size"] == [10, 6, 4]
+    assert told["file_bytes"] == target.stat().st_size
+    assert told["payload_bytes"] == 10 * 6 * 4 * 3 * 4 + 8 * (6 + 2)
+    assert told["metrics"]["grid"]["log_cosine_rms"] < 0.1
+    assert bvbedit.load(target).spline.size == (10, 6, 4)
+
+
+def test_fit_without_options_is_half_diff_root_averaged_within_48_kib(run, folder, tmp_path):
+    status, out, _ = run("fit", folder / "satin.binary", tmp_path / "m.bvb", "--json")
+    told = one_object(out)
+    assert status == 0
+    assert (told["chart"], told["encoding"]["name"], told["knots"]) == ("half-diff", "root", "averaged")
+    assert 40 * 1024 < told["file_bytes"] <= 48 * 1024
+
+
+@pytest.mark.parametrize("bound", [2700, 9000])
+def test_fit_keeps_a_payload_bound(run, folder, tmp_path, bound):
+    status, out, _ = run("fit", folder / "satin.binary", tmp_path / "m.bvb", "--max-payload", bound, "--json")
+    assert status == 0
+    assert 0.7 * bound < one_object(out)["payload_bytes"] <= bound
+
+
+@pytest.mark.parametrize("precision", ["float16", "float32", "float64"])
+def test_fit_stores_in_the_precision_asked_for(run, folder, tmp_path, precision):
+    target = tmp_path / "m.bvb"
+    run("fit", folder / "satin.binary", target, "--size", "6,5,4", "--precision", precision)
+    status, out, _ = run("info", target, "--json")
+    told = one_object(out)
+    assert status == 0
+    assert told["precision"] == precision
+    assert np.load(target)["control"].dtype == precision
+
+
+def test_info_prints_a_table_for_people(run, folder):
+    status, out, err = run("info", folder / "satin.bvb")
+    assert (status, err) == (0, "")
+    assert "half-diff" in out
+    assert "12 x 8 x 5" in out
+    status, out, _ = run("info", folder / "satin.binary")
+    assert status == 0
+    assert "rusinkiewicz" in out
+
+
+def test_compare_of_a_file_with_itself_is_zero_and_of_a_model_is_small(run, folder):
+    status, out, _ = run("compare", folder / "satin.bvb", folder / "satin.bvb", "--json")
+    told = one_object(out)
+    assert status == 0
+    assert told["grid"]["log_cosine_rms"] == told["nodes"]["relative_l1"] == told["paper"]["e_max"] == 0
+    status, out, _ = run("compare", folder / "satin.bvb", folder / "satin.binary", "--json")
+    assert 0 < one_object(out)["grid"]["log_cosine_rms"] < 0.1
+
+
+def test_render_writes_a_row_of_pictures(run, folder, tmp_path):
+    target = tmp_path / "row.png"
+    arguments = ["--width", 24, "--height", 20, "--spp", 4, "--json"]
+    status, out, _ = run("render", folder / "satin.bvb", folder / "satin.binary", target, *arguments)
+    told = one_object(out)
+    assert status == 0
+    assert (told["width"], told["height"], told["spp"], told["seed"]) == (48, 20, 4, 0)
+    from PIL import Image
+
+    with Image.open(target) as picture:
+        assert picture.size == (48, 20)
+
+
+def test_render_writes_linear_exr(run, folder, tmp_path):
+    from bvbedit.io.exr import read_exr
+
+    target = tmp_path / "one.exr"
+    run("render", folder / "satin.bvb", target, "--width", 16, "--height", 16, "--spp", 4)
+    expected = bvbedit.render(bvbedit.load(folder / "satin.bvb"), width=16, height=16, spp=4)
+    np.testing.assert_array_equal(read_exr(target), expected)
+
+
+@pytest.mark.parametrize("suffix", ["binary", "npz"])
+def test_export_agrees_with_the_model_at_its_nodes(run, folder, tmp_path, suffix):
+    target = tmp_path / f"table.{suffix}"
+    status, _, err = run("export", folder / "satin.bvb", target)
+    assert (status, err) == (0, "")
+    model, table = bvbedit.load(folder / "satin.bvb"), bvbedit.load(target)
+    from bvbedit.brdf.charts import grid_points
+
+    points = grid_points(table.axes)[table.valid.reshape(-1)][::997]
+    wi, wo = table.chart.to_directions(points)
+    np.testing.assert_allclose(table.evaluate(wi, wo), model.evaluate(wi, wo), rtol=2e-3, atol=1e-6)
+
+
+def test_sample_list_and_make(run, tmp_path):
+    status, out, _ = run("sample", "list", "--json")
+    names = one_object(out)
+    assert status == 0
+    assert len(names) >= 6
+    assert {"gold-metallic-paint", "teflon", "chrome"} <= set(names)
+    status, out, _ = run("sample", "make", "teflon", tmp_path / "t.binary", "--noise", 0.05, "--seed", 1, "--json")
+    assert status == 0
+    assert (tmp_path / "t.binary").stat().st_size == 34_992_012
+    assert one_object(out)["chart"] == "rusinkiewicz"
+
+
+BAD = [
+    (["fit", "{here}/missing.binary", "{out}/m.bvb"], "missing.binary"),
+    (["fit", "{here}", "{out}/m.bvb"], "folder"),
+    (["fit", "{here}/satin.binary", "{out}/m.bvb", "--chart", "polar"], "polar"),
+    (["fit", "{here}/satin.binary", "{out}/m.bvb", "--chart", "rusinkiewicz"], "rusinkiewicz"),
+    (["fit", "{here}/satin.binary", "{out}/m.bvb", "--encoding", "cube"], "cube"),
+    (["fit", "{here}/satin.binary", "{out}/m.bvb", "--knots", "random"], "random"),
+    (["fit", "{here}/satin.binary", "{out}/m.bvb", "--size", "20,20,800"], "800"),
+    (["fit", "{here}/satin.binary", "{out}/m.bvb", "--size", "3,3,3"], "3"),
+    (["fit", "{here}/satin.binary", "{out}/m.bvb", "--degree", "17"], "17"),
+    (["fit", "{here}/satin.binary", "{out}/m.bvb", "--max-bytes", "10"], "10"),
+    (["fit", "{here}/satin.binary", "{out}/m.bvb", "--size", "8,8,8", "--max-bytes", "9999"], "exclude"),
+    (["fit", "{here}/satin.binary", "{out}/m.bvb", "--precision", "int8"], "int8"),
+    (["fit", "{here}/satin.binary", "{out}/no/such/folder/m.bvb"], "no/such/folder"),
+    (["fit", "{here}/satin.binary", "{out}/m.txt"], ".txt"),
+    (["render", "{here}/satin.bvb", "{out}/p.jpg"], ".jpg"),
+    (["render", "{here}/satin.bvb", "{out}/p.png", "--scene", "moon"], "moon"),
+    (["render", "{here}/satin.bvb", "{out}/p.png", "--width", "0"], "0"),
+    (["render", "{here}/satin.bvb"], "Nothing to render"),
+    (["sample", "make", "unobtainium", "{out}/u.binary"], "unobtainium"),
+    (["sample", "make", "teflon", "{out}/t.binary", "--noise", "7"], "7"),
+    (["sample", "make", "teflon", "{out}/t.binary", "--grid", "paper"], "paper"),
+    (["compare", "{here}/satin.bvb", "{here}/nothing.bvb"], "nothing.bvb"),
+    (["export", "{here}/satin.bvb", "{out}/t.csv"], ".csv"),
+    (["view", "{here}/satin.binary", "--screenshot", "{out}/p.png"], "Fit it first"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "named"), BAD, ids=[" ".join(a).replace("/", "|") for a, _ in BAD])
+def test_what_cannot_be_done_ends_with_one_line_and_status_1(run, folder, tmp_path, arguments, named):
+    status, out, err = run(*(a.format(here=folder, out=tmp_path) for a in arguments))
+    assert (status, out) == (1, "")
+    assert err.startswith("error: ")
+    assert err.count("\n") == 1
+    assert named in err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "arguments", [["fit"], ["fit", "a", "b", "--size", "20,20"], ["fit", "a", "b", "--nonsense"], ["frobnicate"]]
+)
+def test_wrong_usage_ends_with_status_2(run, arguments):
+    status, out, err = run(*arguments)
+    assert (status, out) == (2, "")
+    assert err
+
+
+def test_help_lists_every_command(run):
+    status, out, _ = run("--help")
+    assert status == 0
+    for command in "fit info compare render export sample demo view".split():
+        assert command in out
+
+
+def test_start_up_imports_neither_numba_nor_pyvista(folder):
+    """numba costs 0.25 s and pyvista 0.3 s at import; `--help` and `info` need neither."""
+    code = (
+        "import sys; sys.argv = ['bvbedit', *sys.argv[1:]]\n"
+        "from bvbedit.cli import main\n"
+        "try: main()\n"
+        "except SystemExit: pass\n"
+        "heavy = {'numba', 'pyvista', 'OpenEXR', 'nlopt', 'mitsuba'} & set(sys.modules)\n"
+        "sys.exit(f'imported {heavy}' if heavy else 0)"
+    )
+    for arguments in (["--help"], ["info", str(folder / "satin.bvb")]):
+        subprocess.run([sys.executable, "-c", code, *arguments], check=True, capture_output=True, timeout=60)
+
+
+def test_demo_does_the_whole_job(run, tmp_path):
+    out = tmp_path / "demo"
+    status, printed, _ = run("demo", "--out", out, "--json")
+    told = one_object(printed)
+    assert status == 0
+    assert {"report.md", "comparison.png", "paper.bvb", "half-diff.bvb"} <= set(told["files"])
+    assert "| log-cosine RMS, grid |" in Path(told["report"]).read_text()
