@@ -86,9 +86,7 @@ class MeasuredBrdf(Brdf):
         from bvbedit.brdf import table_kernels
 
         parameters = self.chart.to_parameters(wi, wo)
-        logs, valid = table_kernels.interpolate(
-            parameters, *self.axes, self.chart.periodic[2], self._logs, self.valid
-        )
+        logs, valid = table_kernels.interpolate(parameters, *self.axes, self.chart.periodic[2], self._logs, self.valid)
         # numpy's vector expm1 here, not the scalar one in the kernel: 15 times faster.
         return np.expm1(logs, out=logs) / SCALE, valid
 

@@ -22,9 +22,7 @@ class Glossy(Brdf):
         return f, np.ones(len(f), dtype=bool)
 
 
-def random_pairs(
-    rng: np.random.Generator, count: int, highest: float = np.pi / 2
-) -> tuple[np.ndarray, np.ndarray]:
+def random_pairs(rng: np.random.Generator, count: int, highest: float = np.pi / 2) -> tuple[np.ndarray, np.ndarray]:
     """Return pairs of unit vectors, uniform over the cap of elevations up to ``highest`` (radians)."""
     z = rng.uniform(np.cos(highest), 1.0, (2, count))
     phi = rng.uniform(0, 2 * np.pi, (2, count))

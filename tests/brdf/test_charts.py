@@ -7,8 +7,17 @@ import numpy as np
 import pytest
 
 from bvbedit import BvbError
-from bvbedit.brdf.charts import CHARTS, FITTING_CHARTS, HALF_DIFF, IN_OUT, RUSINKIEWICZ, RUSINKIEWICZ_360, Chart
-from bvbedit.brdf.charts import chart_named, grid_points
+from bvbedit.brdf.charts import (
+    CHARTS,
+    FITTING_CHARTS,
+    HALF_DIFF,
+    IN_OUT,
+    RUSINKIEWICZ,
+    RUSINKIEWICZ_360,
+    Chart,
+    chart_named,
+    grid_points,
+)
 from bvbedit.brdf.geometry import spherical, unit_directions
 from tests.brdf.samples import random_pairs, turned
 

@@ -258,7 +258,9 @@ def test_black_stays_black(encoding):
     assert np.abs(model.spline.control).max() == 0
 
 
-@pytest.mark.parametrize(("size", "degrees"), [((4, 4, 4), (3, 3, 3)), ((1, 1, 1), (0, 0, 0)), ((25, 23, 21), (3, 2, 1))])
+@pytest.mark.parametrize(
+    ("size", "degrees"), [((4, 4, 4), (3, 3, 3)), ((1, 1, 1), (0, 0, 0)), ((25, 23, 21), (3, 2, 1))]
+)
 def test_the_smallest_and_the_largest_net_that_the_data_carry(size, degrees, rng):
     table = _small_table(HALF_DIFF, rng)
     model = fit_net(table, HALF_DIFF, Root(), size=size, degrees=degrees)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_analytic import albedo, pairs
+from tests.brdf.test_analytic import albedo, pairs
 
 from bvbedit.brdf.geometry import spherical
 from bvbedit.brdf.materials import MATERIALS, material_named

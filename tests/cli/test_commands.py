@@ -52,7 +52,7 @@ def test_fit_writes_a_model_and_tells_what_the_contract_lists(run, folder, tmp_p
     status, out, err = run("fit", folder / "satin.binary", target, "--size", "10,6,4", "--json")
     assert (status, err) == (0, "")
     told = one_object(out)
-    keys = "file file_bytes payload_bytes chart encoding degrees size knots condition seconds metrics".split()
+    keys = ["file", "file_bytes", "payload_bytes", "chart", "encoding", "degrees", "size", "knots", "condition", "seconds", "metrics"]
     assert set(keys) <= set(told)
     assert told["size"] == [10, 6, 4]
     assert told["file_bytes"] == target.stat().st_size
@@ -203,7 +203,7 @@ def test_wrong_usage_ends_with_status_2(run, arguments):
 def test_help_lists_every_command(run):
     status, out, _ = run("--help")
     assert status == 0
-    for command in "fit info compare render export sample demo view".split():
+    for command in ["fit", "info", "compare", "render", "export", "sample", "demo", "view"]:
         assert command in out
 
 

@@ -124,5 +124,3 @@ def random_knots(rng: np.random.Generator, degree: int, size: int) -> np.ndarray
     if degree >= 1 and len(interior) > 2:
         interior[1] = interior[0]
     return np.concatenate([np.zeros(degree + 1), interior, np.ones(degree + 1)])
-
-

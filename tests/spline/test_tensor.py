@@ -256,7 +256,9 @@ def test_a_hundred_thousand_knots_on_one_axis(rng):
     spline = TensorSpline((3,), (t,), greville(t, 3)[:, None])
     x = rng.uniform(size=(10_000, 1))
     np.testing.assert_allclose(spline.evaluate(x), x, rtol=0, atol=1e-14)
-    volume = TensorSpline((3, 3, 3), (clamped([], 3), clamped([], 3), t), np.tile(greville(t, 3)[:, None], (4, 4, 1, 3)))
+    volume = TensorSpline(
+        (3, 3, 3), (clamped([], 3), clamped([], 3), t), np.tile(greville(t, 3)[:, None], (4, 4, 1, 3))
+    )
     points = rng.uniform(size=(10_000, 3))
     np.testing.assert_allclose(volume.evaluate(points), np.tile(points[:, 2:], 3), rtol=0, atol=1e-14)
 
@@ -279,7 +281,12 @@ for channels in (3, 4):
 
 
 @pytest.mark.parametrize(
-    "knots", ["0 0 0 0 5e-324 1 1 1 1", "0 0 0 0 1e-200 1e-200 1e-200 1e-200", "-1e308 -1e308 -1e308 -1e308 1e308 1e308 1e308 1e308"]
+    "knots",
+    [
+        "0 0 0 0 5e-324 1 1 1 1",
+        "0 0 0 0 1e-200 1e-200 1e-200 1e-200",
+        "-1e308 -1e308 -1e308 -1e308 1e308 1e308 1e308 1e308",
+    ],
 )
 def test_knots_at_the_ends_of_float64_are_evaluated_right_or_refused(knots):
     """In a process of its own: a wrong span reads outside the net, and no exception tells."""
