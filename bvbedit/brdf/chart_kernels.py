@@ -38,7 +38,8 @@ def half_difference(
         cos_phi, sin_phi = sx / horizontal, sy / horizontal
     dx = (sz * (cos_phi * kx + sin_phi * ky) - horizontal * kz) / s
     dy = cos_phi * ky - sin_phi * kx
-    return theta_h, theta_d, dx, dy
+    # Adding zero makes a negative zero positive: where the azimuth means nothing it is 0, not pi.
+    return theta_h, theta_d, dx + 0.0, dy + 0.0
 
 
 @kernel
@@ -67,6 +68,9 @@ def half_diff_directions(p: Floats) -> tuple[Floats, Floats]:
     wi, wo = np.empty((len(p), 3)), np.empty((len(p), 3))
     for n in prange(len(p)):
         theta_h, phi_d = HALF_PI * p[n, 0] * p[n, 0], HALF_PI * p[n, 2]
+        if math.cos(theta_h) < HORIZON_COSINE:
+            # Both directions lie in the surface: turned against one another there, phi_d cannot be anything else.
+            phi_d = HALF_PI
         theta_d = p[n, 1] * horizon(theta_h, math.cos(phi_d))
         place_half_difference(theta_h, theta_d, phi_d, wi[n], wo[n])
         # The face v = 1 is the horizon itself; rounding must not put it below.
@@ -113,7 +117,8 @@ def in_out_parameters(wi: Floats, wo: Floats) -> Floats:
         dot = wi[n, 0] * wo[n, 0] + wi[n, 1] * wo[n, 1]
         p[n, 0] = min(1.0, math.atan2(math.hypot(wi[n, 0], wi[n, 1]), wi[n, 2]) / HALF_PI)
         p[n, 1] = min(1.0, math.atan2(math.hypot(wo[n, 0], wo[n, 1]), wo[n, 2]) / HALF_PI)
-        p[n, 2] = min(1.0, math.atan2(abs(cross), dot) / math.pi)
+        # Adding zero makes a negative zero positive: at normal incidence phi is 0, not pi.
+        p[n, 2] = min(1.0, math.atan2(abs(cross), dot + 0.0) / math.pi)
     return p
 
 

@@ -10,8 +10,8 @@ import numpy as np
 from bvbedit.brdf.geometry import Floats
 from bvbedit.errors import BvbError
 
-# exp(700) is the last round power that float64 holds: a wild control point decodes to a huge value, not to infinity.
-LARGEST_LOG = 700.0
+# A wild control point decodes to a huge reflectance, not to infinity, which would spread over a whole picture.
+LARGEST = 1e290
 
 
 class Encoding(ABC):
@@ -56,11 +56,11 @@ class Root(Encoding):
         _check_parameter(self.name, "k", self.k, 1.0, 16.0)
 
     def encode(self, f: Floats) -> Floats:
-        f = np.maximum(f, 0.0)
+        f = np.clip(f, 0.0, LARGEST)
         return np.cbrt(f) if self.k == 3 else f ** (1 / self.k)
 
     def decode(self, y: Floats) -> Floats:
-        y = np.maximum(y, 0.0)
+        y = np.clip(y, 0.0, LARGEST ** (1 / self.k))
         return y * y * y if self.k == 3 else y**self.k
 
 
@@ -75,10 +75,10 @@ class Log(Encoding):
         _check_parameter(self.name, "eps", self.eps, 1e-12, 1e6)
 
     def encode(self, f: Floats) -> Floats:
-        return np.log1p(np.maximum(f, 0.0) / self.eps)
+        return np.log1p(np.clip(f, 0.0, LARGEST) / self.eps)
 
     def decode(self, y: Floats) -> Floats:
-        return self.eps * np.expm1(np.clip(y, 0.0, LARGEST_LOG))
+        return self.eps * np.expm1(np.clip(y, 0.0, np.log1p(LARGEST / self.eps)))
 
 
 def _check_parameter(encoding: str, name: str, value: float, lowest: float, highest: float) -> None:

@@ -104,7 +104,10 @@ def sample(brdf: Brdf, chart: Chart, encoding: Encoding, *, partners: bool = Tru
         weights = brdf.valid & _reliable(brdf, chart)
         values = encoding.encode(np.minimum(brdf.filled, LARGEST_REFLECTANCE))
         return _checked(Samples(brdf.axes, values, weights.astype(np.float64), brdf.clamped))
-    wi, wo = (_off_horizon(w) for w in chart.to_directions(grid_points(chart.grid)))
+    wi, wo = chart.to_directions(grid_points(chart.grid))
+    # A pair that is lifted off the horizon is another pair: it fills the node, and carries no weight.
+    unmoved = np.minimum(wi[:, 2], wo[:, 2]) >= np.sin(HORIZON_MARGIN)
+    wi, wo = _off_horizon(wi), _off_horizon(wo)
     pairs = [(wi, wo)]
     if partners:
         mirror = np.array([1.0, -1.0, 1.0])
@@ -114,6 +117,7 @@ def sample(brdf: Brdf, chart: Chart, encoding: Encoding, *, partners: bool = Tru
     total, measured, count = np.zeros((len(wi), 3)), np.zeros((len(wi), 3)), np.zeros(len(wi))
     for i, o in pairs:
         f, trusted = brdf.evaluate_unit(i, o)
+        trusted &= unmoved
         y = encoding.encode(np.minimum(f, LARGEST_REFLECTANCE))
         total, measured, count = total + y, measured + y * trusted[:, None], count + trusted
     shape = tuple(len(u) for u in chart.grid)

@@ -14,12 +14,12 @@ NEGLIGIBLE = 1e-6
 def bracket(nodes: Floats, x: float, periodic: bool) -> tuple[int, int, float]:
     """Return the two nodes around ``x`` and the share of the second: clamped at the ends, or wrapped with period 1."""
     last = len(nodes) - 1
-    if x >= nodes[last]:
+    if x < nodes[0] or x >= nodes[last]:
         if not periodic:
-            return last, last, 0.0
-        return last, 0, (x - nodes[last]) / (1.0 + nodes[0] - nodes[last])
-    if x <= nodes[0]:
-        return 0, 0, 0.0
+            end = 0 if x < nodes[0] else last
+            return end, end, 0.0
+        past = x - nodes[last] + (1.0 if x < nodes[0] else 0.0)
+        return last, 0, past / (1.0 + nodes[0] - nodes[last])
     # Right at once where nodes are equally spaced, as all tables' are; a few steps off where they are nearly so.
     low = min(int((x - nodes[0]) / (nodes[last] - nodes[0]) * last), last - 1)
     while x < nodes[low]:

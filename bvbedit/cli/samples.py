@@ -7,6 +7,7 @@ from cyclopts import App
 
 from bvbedit.cli.models import Json
 from bvbedit.cli.output import progress, report
+from bvbedit.errors import BvbError
 
 sample_app = App(name="sample", help="List and make sample measurements.")
 
@@ -61,8 +62,11 @@ def make(
 
     material = material_named(name)
     check_target(target, (".binary", ".npz"))
+    is_table = target.suffix.lower() == ".npz"
+    if grid == "paper" and not is_table:
+        raise BvbError(f"{target}: MERL's format has no room for the paper grid. Name a file that ends in .npz.")
     with progress(f"Measuring {name}"):
-        table = measure(material.brdf, grid or ("paper" if target.suffix == ".npz" else "merl"), noise=noise, seed=seed)
+        table = measure(material.brdf, grid or ("paper" if is_table else "merl"), noise=noise, seed=seed)
     api.save(table, target)
     report(
         {

@@ -111,15 +111,19 @@ def fit_weighted(
     """Return the spline that minimises sum weights (V - values)^2 over a grid, among the nets that ``project`` keeps.
 
     ``weights`` (m_1, ..., m_d) >= 0 need not be separable; data of weight zero have no influence. ``start`` (n_1, ...,
-    n_d, c) is the first net: directions in which the data say nothing keep what it says. ``project`` is an orthogonal
-    projection on nets. Conjugate gradients on A^T W A, preconditioned by the separable inverse that the marginals of
+    n_d, c) is the first net: of nets that fit equally well, that one is found whose spline is nearest to the start's,
+    weighed by the marginals of the weights. ``project`` is an orthogonal projection on nets. Conjugate gradients on A^T W A, preconditioned by the separable inverse that the marginals of
     W give, until the preconditioned gradient has shrunk to ``tolerance`` of the right-hand side's.
 
-    Raises BvbError as ``loft`` does, and for weights that are negative, not finite or all zero.
+    Raises BvbError as ``loft`` does, for weights that are negative, not finite or all zero, and another start.
     """
     _check_data(values, parameters, knots, degrees)
+    size = tuple(len(t) - p - 1 for t, p in zip(knots, degrees, strict=True))
+    if start.shape != (*size, values.shape[-1]) or not np.isfinite(start).all():
+        raise BvbError(f"The start {start.shape} is no net of size {size} with finite values. Start from a lofted net.")
     if weights.shape != values.shape[:-1] or not np.isfinite(weights).all() or weights.min() < 0 or not weights.any():
         raise BvbError("Weights must be finite, >= 0, not all zero, and have the shape of the data without channels.")
+    weights = weights / weights.max()
     d = len(degrees)
     axes = []
     for a in range(d):
@@ -133,16 +137,21 @@ def fit_weighted(
     for a in range(d):
         right = matrices[a].apply_transposed(right, a)
     right = project(right)
+    # The squares of extreme data leave the range of float64: the iteration works on nets of order one.
+    exponent = int(np.frexp(max(float(np.abs(right).max()), float(np.abs(start).max())))[1])
+    right = np.ldexp(right, -exponent)
 
     def precondition(r: Floats) -> Floats:
         return project(_along_all(inverses, r))
 
-    x = project(start)
+    x = project(np.ldexp(start, -exponent))
     r = right - project(_normal(matrices, weights, x))
     z = precondition(r)
     direction = z
     rz = float(np.vdot(r, z))
-    goal = tolerance**2 * float(np.vdot(right, precondition(right)))
+    # Where the data are zero the start alone tells what is small.
+    scale = max(float(np.vdot(right, precondition(right))), tolerance**2 * rz)
+    goal = tolerance**2 * scale
     first, iterations = rz, 0
     while rz > goal and iterations < max_iterations:
         image = project(_normal(matrices, weights, direction))
@@ -157,11 +166,11 @@ def fit_weighted(
             # The gradient falls roughly geometrically, so that its logarithm tells how far the way has come.
             progress(min(1.0, np.log(first / max(rz, goal)) / max(np.log(first / goal), 1e-9)))
     notes = _penalty_notes(axes)
-    residual = float(np.sqrt(max(rz, 0.0) / goal)) * tolerance if goal > 0 else 0.0
+    residual = float(np.sqrt(max(rz, 0.0) / scale)) if scale > 0 else 0.0
     if rz > goal:
         notes += (f"stopped after {iterations} iterations with the gradient at {residual:.1e} of its scale",)
     # Rounding has drifted from what ``project`` keeps.
-    spline = TensorSpline(degrees, knots, project(x))
+    spline = TensorSpline(degrees, knots, np.ldexp(project(x), exponent))
     return FitResult(spline, tuple(a.condition for a in axes), notes, iterations, residual)
 
 
@@ -207,6 +216,11 @@ def _check_data(values: Floats, parameters: Sequence[Floats], knots: Sequence[Fl
     shape = tuple(len(u) for u in parameters)
     if not len(parameters) == len(knots) == len(degrees) or values.ndim != len(shape) + 1 or values.shape[:-1] != shape:
         raise BvbError(f"Data {values.shape} do not lie on a grid of {shape} nodes with {len(degrees)} degrees.")
+    for axis, (u, t) in enumerate(zip(parameters, knots, strict=True)):
+        if not (np.isfinite(u).all() and u.min() >= t[0] and u.max() <= t[-1]):
+            raise BvbError(
+                f"Nodes of axis {axis} lie outside the knots' [{t[0]:g}, {t[-1]:g}]. Knots must span the data."
+            )
     if not np.isfinite(values).all():
         where = tuple(int(i) for i in np.argwhere(~np.isfinite(values))[0])
         raise BvbError(f"Datum {where} is {values[where]}. Fill or leave out what is not finite.")

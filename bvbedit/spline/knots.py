@@ -1,6 +1,7 @@
 """Knot vectors: full, clamped, validated; where their knots are placed; Greville abscissae."""
 
 from collections.abc import Callable
+from numbers import Integral
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -9,12 +10,15 @@ from bvbedit.errors import BvbError
 
 Floats = NDArray[np.float64]
 MAX_DEGREE = 16
+# Beyond these, differences of knots and products of their quotients leave the range of float64.
+LARGEST_KNOT = 1e100
+SMALLEST_GAP = 1e-100
 
 
-def checked_degree(degree: int) -> int:
+def checked_degree(degree: object) -> int:
     """Return ``degree`` as int. Raises BvbError outside 0 ... 16."""
-    if isinstance(degree, bool) or int(degree) != degree or not 0 <= degree <= MAX_DEGREE:
-        raise BvbError(f"Degree {degree} is not supported. Choose a whole number in 0 ... {MAX_DEGREE}.")
+    if isinstance(degree, bool) or not isinstance(degree, Integral) or not 0 <= degree <= MAX_DEGREE:
+        raise BvbError(f"Degree {degree!r} is not supported. Choose a whole number in 0 ... {MAX_DEGREE}.")
     return int(degree)
 
 
@@ -28,12 +32,19 @@ def checked_knots(knots: ArrayLike, degree: int) -> Floats:
     t = np.array(knots, dtype=np.float64)
     if t.ndim != 1 or len(t) < 2 * (p + 1):
         raise BvbError(f"A knot vector of degree {p} needs at least {2 * (p + 1)} knots in one row, got {t.shape}.")
-    if not np.isfinite(t).all():
-        i = int(np.flatnonzero(~np.isfinite(t))[0])
-        raise BvbError(f"Knot {i} is {t[i]}. Knots must be finite.")
-    if (np.diff(t) < 0).any():
-        i = int(np.flatnonzero(np.diff(t) < 0)[0]) + 1
+    wild = ~(np.abs(t) <= LARGEST_KNOT)
+    if wild.any():
+        i = int(np.flatnonzero(wild)[0])
+        raise BvbError(f"Knot {i} is {t[i]}. Knots must be finite, within {LARGEST_KNOT:g}.")
+    gaps = np.diff(t)
+    if (gaps < 0).any():
+        i = int(np.flatnonzero(gaps < 0)[0]) + 1
         raise BvbError(f"Knot {i} is {t[i]}, below the one before, {t[i - 1]}. Knots must not decrease.")
+    if ((gaps > 0) & (gaps < SMALLEST_GAP)).any():
+        i = int(np.flatnonzero((gaps > 0) & (gaps < SMALLEST_GAP))[0])
+        raise BvbError(
+            f"Knots {i} and {i + 1} are {gaps[i]:g} apart. Make them equal, or {SMALLEST_GAP:g} or more apart."
+        )
     if t[0] != t[p] or t[-1] != t[-p - 1]:
         raise BvbError(f"The knot vector is not clamped: repeat the first and the last knot {p + 1} times.")
     over = np.flatnonzero(t[p + 1 :] == t[: -p - 1])

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from functools import cached_property
 from math import factorial
+from numbers import Integral
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -131,9 +132,9 @@ class TensorSpline:
 
         Past the degree it is the zero spline of degree 0. Raises BvbError for an unknown axis or a negative order.
         """
-        if not 0 <= axis < self.parameters:
+        if axis not in range(self.parameters):
             raise BvbError(f"Axis {axis} does not exist. Choose one of 0 ... {self.parameters - 1}.")
-        if order < 0 or int(order) != order:
+        if not isinstance(order, Integral) or order < 0:
             raise BvbError(f"Derivative order {order} is not a whole number >= 0.")
         spline = self
         for _ in range(order):

@@ -97,7 +97,10 @@ def test_pairs_that_both_graze_come_back_as_well_as_float64_can_tell(chart, expo
     z[0, 2000:4000] = 0.0
     phi = rng.uniform(0, 2 * np.pi, (2, 20_000))
     wi, wo = (unit_directions(np.stack([np.cos(p), np.sin(p), c], axis=-1), "w") for p, c in zip(phi, z, strict=True))
-    assert (_kept(chart, wi, wo) < 1e-11 + 1e-14 / z.max(axis=0)).all()
+    cos_h = z.sum(axis=0) / np.linalg.norm(wi + wo, axis=1)
+    # At 1e-12 the horizon angle becomes pi/2: rounding may put a pair and its image on different sides of the step.
+    told = np.abs(cos_h - 1e-12) > 1e-14
+    assert (_kept(chart, wi, wo) < 1e-11 + 1e-14 / z.max(axis=0))[told].all()
 
 
 @each_fitting

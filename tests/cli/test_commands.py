@@ -52,7 +52,19 @@ def test_fit_writes_a_model_and_tells_what_the_contract_lists(run, folder, tmp_p
     status, out, err = run("fit", folder / "satin.binary", target, "--size", "10,6,4", "--json")
     assert (status, err) == (0, "")
     told = one_object(out)
-    keys = ["file", "file_bytes", "payload_bytes", "chart", "encoding", "degrees", "size", "knots", "condition", "seconds", "metrics"]
+    keys = [
+        "file",
+        "file_bytes",
+        "payload_bytes",
+        "chart",
+        "encoding",
+        "degrees",
+        "size",
+        "knots",
+        "condition",
+        "seconds",
+        "metrics",
+    ]
     assert set(keys) <= set(told)
     assert told["size"] == [10, 6, 4]
     assert told["file_bytes"] == target.stat().st_size
@@ -66,7 +78,7 @@ def test_fit_without_options_is_half_diff_root_averaged_within_48_kib(run, folde
     told = one_object(out)
     assert status == 0
     assert (told["chart"], told["encoding"]["name"], told["knots"]) == ("half-diff", "root", "averaged")
-    assert 40 * 1024 < told["file_bytes"] <= 48 * 1024
+    assert 0.8 * 48 * 1024 < told["file_bytes"] <= 48 * 1024
 
 
 @pytest.mark.parametrize("bound", [2700, 9000])

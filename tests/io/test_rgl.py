@@ -36,7 +36,8 @@ def test_what_is_written_is_read(tmp_path, fields):
         np.testing.assert_array_equal(getattr(brdf, name), fields[name])
     np.testing.assert_array_equal(brdf.rgb, fields["rgb"][0])
     # Only the scale of the density has no meaning.
-    expected = fields["vndf"][0] / fields["vndf"][0].max(axis=(1, 2), keepdims=True)
+    vndf = fields["vndf"][0].astype(float)
+    expected = vndf / vndf.max(axis=(1, 2), keepdims=True)
     np.testing.assert_allclose(brdf.vndf / brdf.vndf.max(axis=(1, 2), keepdims=True), expected, rtol=1e-12)
 
 
@@ -45,7 +46,7 @@ def test_two_azimuths_are_read_at_zero(tmp_path, fields):
         name: np.concatenate([a, 3 * a]) if name in ("vndf", "rgb", "luminance") else a for name, a in fields.items()
     }
     brdf = load_rgl(written(tmp_path, two | {"phi_i": np.array([-1.0, 1.0], np.float32)}))
-    np.testing.assert_allclose(brdf.rgb, 2 * fields["rgb"][0].astype(float), rtol=1e-12)
+    np.testing.assert_allclose(brdf.rgb, 2 * fields["rgb"][0].astype(float), rtol=1e-6)
 
 
 def test_mitsuba_evaluates_the_file_to_the_same(tmp_path, fields, rng):
@@ -78,7 +79,7 @@ def test_what_is_no_such_file_is_refused(tmp_path, fields):
         "anisotropic": changed(fields, phi_i=azimuths),
         "no field ndf": changed(fields, ndf=None),
         "azimuths": changed(fields, phi_i=azimuths[:2]),
-        "cut off": sound[:100],
+        "cut off": sound[:40],
         "does not lie within": sound[:-500],
         "version is 2.0": sound[:12] + bytes([2, 0]) + sound[14:],
         "claims": sound[:14] + b"\xff\xff\xff\xff" + sound[18:],

@@ -109,7 +109,7 @@ def test_bad_degrees_are_refused(degree):
         checked_degree(degree)
 
 
-@pytest.mark.parametrize("degree", [0, 3, 16, np.int64(5), 4.0])
+@pytest.mark.parametrize("degree", [0, 3, 16, np.int64(5)])
 def test_whole_degrees_become_int(degree):
     assert checked_degree(degree) == degree
     assert type(checked_degree(degree)) is int
