@@ -22,6 +22,10 @@ from bvbedit.spline.knots import place_knots
 HORIZON_MARGIN = 1e-4
 # Larger values are artefacts of dividing by a vanishing cosine.
 LARGEST_REFLECTANCE = 1e5
+# What a node without data weighs, its value held from the nearest node with data. Left free, 48 KiB models of six
+# measurements rose beyond 85 degrees to 35 ... 5e6 times the held value, and glittered; so they stay within 3.6 ... 220
+# times, while log_cosine_rms rises by 0 ... 1 % on `grid` and 0 ... 11 % on `nodes` (1e-2: 0 ... 23 %).
+HELD_WEIGHT = 1e-3
 
 Progress = Callable[[float], None]
 
@@ -51,8 +55,9 @@ def fit_net(
 ) -> SplineBrdf:
     """Return the B-spline volume of ``size`` control points that approximates ``brdf``, with a report.
 
-    Directions that are one pair in the chart (its folds) are averaged; cells without data carry no weight; the
-    control points of degenerate faces are kept equal. The published configuration alone (``in-out``, ``linear``,
+    Directions that are one pair in the chart (its folds) are averaged. What stands in cells without data has no
+    influence: there the value held from the nearest cell with data asks for ``HELD_WEIGHT`` of a cell's weight, so that
+    the model has no freedom to run wild. The control points of degenerate faces are kept equal. The published configuration alone (``in-out``, ``linear``,
     ``piegl-tiller``) is lofted to the filled table with equal weights and free faces (Lee & Park 2008).
     Raises BvbError where size and degrees do not suit each other or the data.
     """
@@ -69,7 +74,7 @@ def fit_net(
         first = loft(values, samples.axes, vectors, degrees)
         result = fit_weighted(
             values,
-            samples.weights,
+            np.where(samples.weights > 0, samples.weights, HELD_WEIGHT),
             samples.axes,
             vectors,
             degrees,
