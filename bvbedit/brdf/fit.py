@@ -36,7 +36,7 @@ class Samples:
 
     axes: tuple[Floats, Floats, Floats]
     values: Floats
-    """(m_0, m_1, m_2, 3) encoded means over the symmetric partners that were measured, or over all if none was."""
+    """(m_0, m_1, m_2, 3) encoded means over the symmetric partners that were measured."""
     weights: Floats
     """(m_0, m_1, m_2): the share of the symmetric partners that were measured."""
     clamped: float
@@ -57,9 +57,9 @@ def fit_net(
 
     Directions that are one pair in the chart (its folds) are averaged. What stands in cells without data has no
     influence: there the value held from the nearest cell with data asks for ``HELD_WEIGHT`` of a cell's weight, so that
-    the model has no freedom to run wild. The control points of degenerate faces are kept equal. The published configuration alone (``in-out``, ``linear``,
-    ``piegl-tiller``) is lofted to the filled table with equal weights and free faces (Lee & Park 2008).
-    Raises BvbError where size and degrees do not suit each other or the data.
+    the model has no freedom to run wild. The control points of degenerate faces are kept equal. The published
+    configuration alone (``in-out``, ``linear``, ``piegl-tiller``) is lofted to the filled table with equal weights and
+    free faces (Lee & Park 2008). Raises BvbError where size and degrees do not suit each other or the data.
     """
     start = perf_counter()
     if len(size) != 3 or len(degrees) != 3:
@@ -113,22 +113,25 @@ def sample(brdf: Brdf, chart: Chart, encoding: Encoding, *, partners: bool = Tru
     # A pair that is lifted off the horizon is another pair: it fills the node, and carries no weight.
     unmoved = np.minimum(wi[:, 2], wo[:, 2]) >= np.sin(HORIZON_MARGIN)
     wi, wo = _off_horizon(wi), _off_horizon(wo)
+    shape = tuple(len(u) for u in chart.grid)
+    clamped = brdf.clamped if isinstance(brdf, MeasuredBrdf) else 0.0
     pairs = [(wi, wo)]
     if partners:
         mirror = np.array([1.0, -1.0, 1.0])
         pairs.append((wi * mirror, wo * mirror))
         if chart.reciprocal and not brdf.reciprocal:
             pairs += [(o, i) for i, o in pairs]
-    total, measured, count = np.zeros((len(wi), 3)), np.zeros((len(wi), 3)), np.zeros(len(wi))
+    values, count = np.zeros((len(wi), 3)), np.zeros(len(wi))
     for i, o in pairs:
         f, trusted = brdf.evaluate_unit(i, o)
-        trusted &= unmoved
-        y = encoding.encode(np.minimum(f, LARGEST_REFLECTANCE))
-        total, measured, count = total + y, measured + y * trusted[:, None], count + trusted
-    shape = tuple(len(u) for u in chart.grid)
-    known = (count > 0)[:, None]
-    values = np.where(known, measured / np.maximum(count, 1)[:, None], total / len(pairs))
-    clamped = brdf.clamped if isinstance(brdf, MeasuredBrdf) else 0.0
+        y = encoding.encode(np.minimum(f, LARGEST_REFLECTANCE, out=f))
+        if partners:
+            trusted &= unmoved
+            y[~trusted] = 0.0
+        values += y
+        count += trusted
+    if partners:
+        values /= np.maximum(count, 1.0)[:, None]
     return _checked(Samples(chart.grid, values.reshape(*shape, 3), (count / len(pairs)).reshape(shape), clamped))
 
 

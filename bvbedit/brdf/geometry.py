@@ -32,7 +32,7 @@ def unit_directions(value: ArrayLike, name: str) -> Floats:
 
 
 def spherical(theta: ArrayLike, phi: ArrayLike) -> Floats:
-    """Return unit vectors (..., 3) at the angle ``theta`` from the normal and the azimuth ``phi`` (radians, broadcast)."""
+    """Return unit vectors (..., 3) at the angle ``theta`` from the normal and azimuth ``phi`` (radians, broadcast)."""
     theta, phi = np.broadcast_arrays(np.asarray(theta, dtype=np.float64), np.asarray(phi, dtype=np.float64))
     s = np.sin(theta)
     return np.stack([s * np.cos(phi), s * np.sin(phi), np.cos(theta)], axis=-1)

@@ -12,6 +12,7 @@ from bvbedit.errors import BvbError
 
 # Between nodes the table is linear in log(1 + SCALE f): peaks of 1e4 beside 1e-3 ask for a logarithm.
 SCALE = 1000.0
+LOG_BLOCK = 1 << 14
 
 
 class MeasuredBrdf(Brdf):
@@ -73,14 +74,20 @@ class MeasuredBrdf(Brdf):
 
     @cached_property
     def _logs(self) -> Floats:
-        """log(1 + SCALE f), as log(u) x/(u - 1) with u = 1 + x rounded: exact, and numpy's log is quicker than log1p."""
-        x = SCALE * self.filled
-        u = 1.0 + x
-        rounded = u - 1.0
-        np.log(u, out=u)
-        np.divide(u, rounded, out=u, where=rounded != 0)
-        np.copyto(u, 1.0, where=rounded == 0)
-        return np.multiply(u, x, out=u)
+        """log(1 + SCALE f), as log(u) x/(u - 1) with u = 1 + x rounded: exact; numpy's log is quicker than log1p."""
+        logs = np.empty_like(self.filled)
+        values, out = self.filled.reshape(-1), logs.reshape(-1)
+        # In blocks that stay in the cache.
+        for start in range(0, len(values), LOG_BLOCK):
+            block = slice(start, start + LOG_BLOCK)
+            x = SCALE * values[block]
+            u = 1.0 + x
+            rounded = u - 1.0
+            np.log(u, out=u)
+            np.divide(u, rounded, out=u, where=rounded != 0)
+            np.copyto(u, 1.0, where=rounded == 0)
+            np.multiply(u, x, out=out[block])
+        return logs
 
     def _evaluate(self, wi: Floats, wo: Floats) -> tuple[Floats, Bools]:
         from bvbedit.brdf import table_kernels

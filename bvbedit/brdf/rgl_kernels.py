@@ -27,7 +27,7 @@ def bilinear(image: Floats, y: float, x: float) -> float:
     i, s = cell(y, image.shape[0])
     j, t = cell(x, image.shape[1])
     low = (1.0 - t) * image[i, j] + t * image[i, j + 1]
-    return (1.0 - s) * low + s * ((1.0 - t) * image[i + 1, j] + t * image[i + 1, j + 1])
+    return float((1.0 - s) * low + s * ((1.0 - t) * image[i + 1, j] + t * image[i + 1, j + 1]))
 
 
 @kernel

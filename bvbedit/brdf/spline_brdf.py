@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from bvbedit.brdf.base import Brdf
-from bvbedit.brdf.charts import Chart
+from bvbedit.brdf.charts import FITTING_CHARTS, Chart
 from bvbedit.brdf.encodings import Encoding
 from bvbedit.brdf.geometry import Bools, Floats
 from bvbedit.errors import BvbError
@@ -19,7 +19,7 @@ class SplineBrdf(Brdf):
 
     ``spline`` has three parameters on [0, 1] and three channels. ``report`` tells how the model was fitted, as JSON
     can hold it; an edited model (``with_spline``) has none, since it would no longer be true.
-    Raises BvbError for a spline of another shape or domain.
+    Raises BvbError for a spline of another shape or domain, and for charts that only tables have.
     """
 
     reliable_elevation = float(np.pi / 2)
@@ -29,6 +29,8 @@ class SplineBrdf(Brdf):
     ) -> None:
         if spline.parameters != 3 or spline.channels != 3 or spline.domain != ((0.0, 1.0),) * 3:
             raise BvbError(f"{spline!r} on {spline.domain} is no BRDF. Give 3 parameters on [0, 1] and 3 channels.")
+        if chart.name not in FITTING_CHARTS:
+            raise BvbError(f"Chart {chart.name!r} is for tables only. A model lives in {' or '.join(FITTING_CHARTS)}.")
         self.spline = spline
         self.chart = chart
         self.encoding = encoding

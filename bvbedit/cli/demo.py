@@ -15,7 +15,7 @@ FITS: dict[str, tuple[str, dict[str, Any]]] = {
     ),
     "half-diff": ("half-diff, root, 48 KiB", {"chart": "half-diff", "encoding": "root"}),
 }
-PICTURE = {"width": 320, "height": 320, "spp": 64}
+PICTURE: dict[str, Any] = {"width": 320, "height": 320, "spp": 64}
 AMPLIFIED = 8
 
 

@@ -36,7 +36,7 @@ def dumps(model: SplineBrdf, precision: str = "float32") -> bytes:
         raise BvbError(f"Unknown precision {precision!r}. Choose one of {', '.join(PRECISIONS)}.")
     control = model.spline.control
     largest = float(np.abs(control).max())
-    if largest > np.finfo(precision).max:
+    if largest > float(np.finfo(precision).max):
         raise BvbError(f"A control point of {largest:g} does not fit into {precision}. Save in a higher precision.")
     meta = {
         "format": FORMAT,

@@ -1,6 +1,7 @@
 """Reading and writing files so that nothing is half-written and every failure is told in one line."""
 
 import os
+import stat
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -12,11 +13,15 @@ from bvbedit.errors import BvbError
 
 @contextmanager
 def reading(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
-    """Open ``path`` for reading bytes. Raises BvbError for a missing file, a folder, or one that cannot be read."""
+    """Open ``path`` for reading bytes. Raises BvbError for what is missing, no regular file, or cannot be read."""
     path = Path(path)
-    if path.is_dir():
-        raise BvbError(f"{path} is a folder. Name a file.")
     try:
+        mode = path.stat().st_mode
+        if stat.S_ISDIR(mode):
+            raise BvbError(f"{path} is a folder. Name a file.")
+        # A pipe may never speak, and no reader here can do without seeking.
+        if not stat.S_ISREG(mode):
+            raise BvbError(f"{path} is a device or a pipe. Write its content to a file first.")
         with path.open("rb") as stream:
             yield stream
     except FileNotFoundError:
@@ -43,8 +48,8 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
                 yield stream
                 stream.flush()
                 os.fsync(stream.fileno())
-            os.chmod(temporary, _permissions(path))
-            os.replace(temporary, path)
+            Path(temporary).chmod(_permissions(path))
+            Path(temporary).replace(path)
             temporary = None
         except FileNotFoundError:
             raise BvbError(f"{path} cannot be written: {path.parent} does not exist. Make the folder first.") from None
@@ -53,11 +58,11 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     finally:
         if temporary is not None:
             with suppress(OSError):
-                os.unlink(temporary)
+                Path(temporary).unlink()
 
 
 def check_target(path: str | os.PathLike[str], suffixes: Sequence[str]) -> None:
-    """Raise BvbError where ``path`` has none of the ``suffixes`` or cannot become a file: before long work, not after."""
+    """Raise BvbError where ``path`` has none of the ``suffixes`` or cannot become a file: before long work."""
     path = Path(path)
     if path.suffix.lower() not in suffixes:
         raise BvbError(f"{path} has the suffix {path.suffix!r}. Name a file that ends in {' or '.join(suffixes)}.")

@@ -41,13 +41,11 @@ def load_merl(path: str | os.PathLike[str]) -> MeasuredBrdf:
     if not np.isfinite(raw).all():
         channel, cell = (int(i) for i in np.argwhere(~np.isfinite(raw))[0])
         raise BvbError(f"{path}: cell {cell} of channel {channel} is {raw[channel, cell]}. Mark it invalid with -1.")
-    values = np.empty((raw.shape[1], 3))
-    for c in range(3):
-        np.multiply(raw[c], SCALE[c], out=values[:, c])
     valid = (raw >= 0).all(axis=0)
+    raw *= SCALE[:, None]
     chart = CHARTS[dims[0], dims[1], dims[2]]
     try:
-        return MeasuredBrdf(values.reshape(*dims, 3), valid.reshape(dims), chart.grid, chart)
+        return MeasuredBrdf(np.moveaxis(raw.reshape(3, *dims), 0, -1), valid.reshape(dims), chart.grid, chart)
     except BvbError as error:
         raise BvbError(f"{path} is not a sound measurement: {error}") from None
 

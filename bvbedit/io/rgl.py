@@ -108,4 +108,4 @@ def _at_azimuth_zero(stack: NDArray[Any], phi_i: NDArray[Any]) -> Floats:
     if len(phi_i) == 1 or not phi_i[1] > phi_i[0]:
         return first
     share = float(np.clip(-phi_i[0] / (phi_i[1] - phi_i[0]), 0.0, 1.0))
-    return (1.0 - share) * first + share * stack[1]
+    return np.asarray((1.0 - share) * first + share * stack[1], dtype=np.float64)

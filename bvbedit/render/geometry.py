@@ -11,7 +11,7 @@ NEVER = math.inf
 def sphere_distance(
     ox: float, oy: float, oz: float, dx: float, dy: float, dz: float, cx: float, cy: float, cz: float, radius: float
 ) -> float:
-    """Return how far along the unit direction d a ray from o, outside the sphere, enters it; infinity if it does not."""
+    """Return how far along the unit direction d a ray from o, outside the sphere, enters it, else infinity."""
     ox, oy, oz = ox - cx, oy - cy, oz - cz
     along = ox * dx + oy * dy + oz * dz
     if along >= 0:
@@ -26,7 +26,7 @@ def sphere_distance(
 
 @kernel
 def tangent(nx: float, ny: float) -> tuple[float, float]:
-    """Return x and y of the horizontal unit tangent at a normal n, along the parallel of latitude; (1, 0) at the poles."""
+    """Return x and y of the horizontal unit tangent at a normal n along its parallel; (1, 0) at the poles."""
     length = math.hypot(nx, ny)
     if length < 1e-12:
         return 1.0, 0.0

@@ -32,9 +32,9 @@ def compare_pictures(
 ) -> PictureComparison:
     """Compare two linear pictures (h, w, 3) of one size.
 
-    Mean and peak absolute error (ImageMagick's MAE and PAE over its quantum range) and PSNR are taken of the tone-mapped
-    8-bit pictures, over pixels and channels; with ``flip`` also HDR-FLIP of the linear ones.
-    Raises BvbError for other shapes, nan or infinity, and as ``hdr_flip`` does.
+    Mean and peak absolute error (ImageMagick's MAE and PAE over its quantum range) and PSNR are taken of the
+    tone-mapped 8-bit pictures, over pixels and channels; with ``flip`` also HDR-FLIP of the linear ones. Raises
+    BvbError for other shapes, nan or infinity, and as ``hdr_flip`` does.
     """
     a, b = _pair(test, reference)
     difference = (tone_map(a, exposure).astype(np.float64) - tone_map(b, exposure)) / 255

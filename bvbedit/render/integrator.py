@@ -1,9 +1,10 @@
 """Direct light on the sphere: wave after wave of paths, with the material evaluated in bulk between two kernels' work.
 
-Light paths are: sky or sun to the sphere; sky or sun to the ground and from there to the sphere; each seen by the camera,
-as is the ground itself. Light that has left the sphere is not followed, so the ground shows its shadow, not its colour.
-Directions are drawn with density cos(theta)/pi whatever the material: a Lambertian one is nearly free of noise, a mirror
-needs thousands of samples per pixel for what it mirrors (the sun's highlight has no noise, being a delta light).
+Light paths are: sky or sun to the sphere; sky or sun to the ground and from there to the sphere; each seen by the
+camera, as is the ground itself. Light that has left the sphere is not followed, so the ground shows its shadow, not its
+colour. Directions are drawn with density cos(theta)/pi whatever the material: a Lambertian one is nearly free of noise,
+a mirror needs thousands of samples per pixel for what it mirrors (the sun's highlight has no noise, being a delta
+light).
 """
 
 import operator
@@ -40,13 +41,13 @@ def render(
 ) -> Picture:
     """Return a picture (height, width, 3) of ``scene`` with its sphere made of ``model``: linear RGB radiance, float32.
 
-    ``scene``: sphere, studio, furnace, the path of a lat-long ``.exr`` panorama, or a Scene. ``spp``: samples per pixel,
-    best a power of two. ``seed``: 0 to 2^63 - 1. ``progress`` is called with the finished fraction.
-    The random numbers depend on seed, pixel and sample alone: pictures of two materials differ only where the materials
-    do, and one seed gives one picture bit for bit on any number of threads.
+    ``scene``: sphere, studio, furnace, the path of a lat-long ``.exr`` panorama, or a Scene. ``spp``: samples per
+    pixel, best a power of two. ``seed``: 0 to 2^63 - 1. ``progress`` is called with the finished fraction. The random
+    numbers depend on seed, pixel and sample alone: pictures of two materials differ only where the materials do, and
+    one seed gives one picture bit for bit on any number of threads.
 
-    Raises BvbError for anything that is not a Brdf, unknown scenes, sizes outside 1 to 8192, spp outside 1 to 65536, and
-    materials whose values are not finite.
+    Raises BvbError for anything that is not a Brdf, unknown scenes, sizes outside 1 to 8192, spp outside 1 to 65536,
+    and materials whose values are not finite.
     """
     if not isinstance(model, Brdf):
         raise BvbError(f"model is {type(model).__name__}, not a Brdf. Give what load() or fit() returned.")

@@ -46,7 +46,7 @@ def look_up(texels: Array, x: float, y: float, z: float) -> RGB:
 def ground_radiance(
     x: float, y: float, u: float, v: float, sphere: Ball, ground: Array, sun: Array, texels: Array
 ) -> RGB:
-    """Return one sample of the light that the ground sends back from (x, y): the sky and the sun, or the sphere's shadow."""
+    """Return one sample of the light that the ground sends back from (x, y): sky and sun, or the sphere's shadow."""
     cx, cy, cz, radius = sphere
     height = ground[0]
     dx, dy, dz = cosine_direction(u, v)
@@ -78,11 +78,11 @@ def trace(
 ) -> None:
     """Trace every sample of a run of pixels.
 
-    ``first`` is the first pixel's number in the picture of ``shape`` (h, w). ``camera`` (4, 3): position, then right, up
-    and forward, where right and up reach the middle of the right and the upper edge. ``sphere``: centre, radius. ``ground``:
-    height, albedo, or empty. ``sun``: direction, irradiance, or empty. ``texels`` (h, w, 3).
-    Writes, per pixel: ``direct`` (n, 3), the sum over samples that need no material; and per sample and light (n, s, k):
-    ``lit``, whether light arrives; there ``wi``, ``wo`` in the sphere's frame, and ``light``, by which f_r is multiplied:
+    ``first`` is the first pixel's number in the picture of ``shape`` (h, w). ``camera`` (4, 3): position, then right,
+    up and forward, where right and up reach the middle of the right and the upper edge. ``sphere``: centre, radius.
+    ``ground``: height, albedo, or empty. ``sun``: direction, irradiance, or empty. ``texels`` (h, w, 3). Writes, per
+    pixel: ``direct`` (n, 3), the sum over samples that need no material; and per sample and light (n, s, k): ``lit``,
+    whether light arrives; there ``wi``, ``wo`` in the sphere's frame, and ``light``, by which f_r is multiplied:
     radiance times cosine over density (elsewhere zero). Light 0 is the surroundings, light 1 the sun.
     """
     height, width = shape

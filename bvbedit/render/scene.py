@@ -1,7 +1,7 @@
 """What is looked at: a sphere of the material, the ground it stands on, and the light around it, as plain values.
 
-The world is right-handed with z up. Lengths have no unit; radiance and irradiance are linear RGB. Nothing here knows how
-a picture is computed.
+The world is right-handed with z up. Lengths have no unit; radiance and irradiance are linear RGB. Nothing here knows
+how a picture is computed.
 """
 
 from dataclasses import dataclass
@@ -204,7 +204,7 @@ def _vector(value: ArrayLike, name: str, lowest: float = -np.inf, highest: float
     except (TypeError, ValueError):
         v = np.empty(0)
     if v.shape != (3,) or not np.isfinite(v).all():
-        raise BvbError(f"{name} is {value}. Give three finite numbers.")
+        raise BvbError(f"{name} is {value!r}. Give three finite numbers.")
     if v.min() < lowest or v.max() > highest:
-        raise BvbError(f"{name} is {value}. Its components must lie in [{lowest:g}, {highest:g}].")
+        raise BvbError(f"{name} is {value!r}. Its components must lie in [{lowest:g}, {highest:g}].")
     return (float(v[0]), float(v[1]), float(v[2]))

@@ -2,9 +2,9 @@
 
 Compiled; arguments are taken to be right. All words are uint64 that hold 32 bits, because numba would turn a mixture of
 signed and unsigned words into floats.
-Sources: Sobol' (0, 2)-sequence and its Pascal matrix, Ahmed 2024, "An implementation algorithm of 2D Sobol sequence fast,
-elegant, and compact"; scrambling by hashing, Burley 2020, "Practical hash-based Owen scrambling" (Laine-Karras hash with
-Vegdahl's constants); splitmix64, Steele et al. 2014.
+Sources: Sobol' (0, 2)-sequence and its Pascal matrix, Ahmed 2024, "An implementation algorithm of 2D Sobol sequence
+fast, elegant, and compact"; scrambling by hashing, Burley 2020, "Practical hash-based Owen scrambling" (Laine-Karras
+hash with Vegdahl's constants); splitmix64, Steele et al. 2014.
 """
 
 import numpy as np
@@ -54,14 +54,14 @@ def scramble(x: U, seed: U) -> U:
 
 @kernel
 def point(state: U, sample: int, pair: int) -> tuple[float, float]:
-    """Return point ``sample`` in [0, 1)^2 of the sequence with hashed ``state``; each ``pair`` is a sequence of its own.
+    """Return point ``sample`` in [0, 1)^2 of the sequence with hashed ``state``; each ``pair`` is its own sequence.
 
     Any 2^k first points are a (0, 2)-net: one in each of the 2^k boxes of every shape.
     """
     keys, more = mix(state, U(2 * pair)), mix(state, U(2 * pair + 1))
     # Shuffle the order, so that different pairs of one pixel are independent of one another.
     index = reverse(scramble(reverse(U(sample)), keys & WORD))
-    # The first Sobol' coordinate is the index with reversed bits, the second the Pascal matrix modulo 2 times the index.
+    # The first Sobol' coordinate is the index with reversed bits, the second the index times Pascal's matrix modulo 2.
     second = index
     second ^= (second >> ONE) & LOW1
     second ^= (second >> TWO) & LOW2

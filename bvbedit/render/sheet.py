@@ -36,9 +36,9 @@ def amplified_difference(a: ArrayLike, b: ArrayLike, factor: float = 8.0) -> Pic
 def sheet(entries: Sequence[tuple[str, ArrayLike]], *, columns: int | None = None, gap: int = 8) -> Picture8:
     """Return labelled 8-bit pictures in rows of ``columns`` (all in one row by default) on white, ``gap`` pixels apart.
 
-    ``entries``: (label, picture (h, w, 3) uint8); a label wider than its picture is cut, and without any labels the lines
-    for them are left out. Pictures may differ in size: each column and row is as large as its largest.
-    Raises BvbError for no pictures, pictures that are not uint8, columns below 1 and gaps outside 0 to 1000.
+    ``entries``: (label, picture (h, w, 3) uint8); a label wider than its picture is cut, and without any labels the
+    lines for them are left out. Pictures may differ in size: each column and row is as large as its largest. Raises
+    BvbError for no pictures, pictures that are not uint8, columns below 1 and gaps outside 0 to 1000.
     """
     pictures = [_picture(p, f"picture {n}") for n, (_, p) in enumerate(entries)]
     labels = [str(label) for label, _ in entries]

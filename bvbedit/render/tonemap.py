@@ -11,7 +11,7 @@ MAX_STOPS = 64.0
 
 
 def linear_picture(picture: ArrayLike, name: str) -> NDArray[np.floating]:
-    """Return ``picture`` as an array (h, w, 3) of floats. Raises BvbError for another shape, and for nan or infinity."""
+    """Return ``picture`` as an array (h, w, 3) of floats. Raises BvbError for another shape, nan or infinity."""
     p = np.asarray(picture)
     if p.ndim != 3 or p.shape[-1] != 3 or p.size == 0 or p.dtype.kind != "f":
         raise BvbError(f"{name} is {p.dtype} of shape {p.shape}. Give a linear picture: floats (height, width, 3).")

@@ -112,8 +112,9 @@ def fit_weighted(
 
     ``weights`` (m_1, ..., m_d) >= 0 need not be separable; data of weight zero have no influence. ``start`` (n_1, ...,
     n_d, c) is the first net: of nets that fit equally well, that one is found whose spline is nearest to the start's,
-    weighed by the marginals of the weights. ``project`` is an orthogonal projection on nets. Conjugate gradients on A^T W A, preconditioned by the separable inverse that the marginals of
-    W give, until the preconditioned gradient has shrunk to ``tolerance`` of the right-hand side's.
+    weighed by the marginals of the weights. ``project`` is an orthogonal projection on nets. Conjugate gradients on A^T
+    W A, preconditioned by the separable inverse that the marginals of W give, until the preconditioned gradient has
+    shrunk to ``tolerance`` of the right-hand side's.
 
     Raises BvbError as ``loft`` does, for weights that are negative, not finite or all zero, and another start.
     """

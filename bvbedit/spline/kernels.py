@@ -112,7 +112,7 @@ def locate(x: float, knots: Floats, bins: Indices, scale: float, last: int) -> i
         span += 1
     while x < knots[span]:  # rounding put x one bin too far
         span -= 1
-    return span
+    return int(span)
 
 
 @parallel_kernel

@@ -17,7 +17,7 @@ SMALLEST_GAP = 1e-100
 
 def checked_degree(degree: object) -> int:
     """Return ``degree`` as int. Raises BvbError outside 0 ... 16."""
-    if isinstance(degree, bool) or not isinstance(degree, Integral) or not 0 <= degree <= MAX_DEGREE:
+    if isinstance(degree, bool) or not isinstance(degree, Integral) or int(degree) not in range(MAX_DEGREE + 1):
         raise BvbError(f"Degree {degree!r} is not supported. Choose a whole number in 0 ... {MAX_DEGREE}.")
     return int(degree)
 
@@ -84,7 +84,7 @@ def averaged(parameters: Floats, size: int, degree: int) -> Floats:
     u = np.interp(index, np.arange(len(parameters)), parameters)
     if degree == 0:
         return np.asarray(0.5 * (u[:-1] + u[1:]))
-    return np.lib.stride_tricks.sliding_window_view(u, degree).mean(axis=1)[1 : size - degree]
+    return np.asarray(np.lib.stride_tricks.sliding_window_view(u, degree).mean(axis=1)[1 : size - degree])
 
 
 def uniform(parameters: Floats, size: int, degree: int) -> Floats:

@@ -63,7 +63,7 @@ class TensorSpline:
     @property
     def channels(self) -> int:
         """The number of values at each control point."""
-        return self.control.shape[-1]
+        return int(self.control.shape[-1])
 
     @property
     def domain(self) -> tuple[tuple[float, float], ...]:

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.brdf.test_analytic import albedo, pairs
 
 from bvbedit.brdf.geometry import spherical
 from bvbedit.brdf.materials import MATERIALS, material_named
 from bvbedit.errors import BvbError
+from tests.brdf.test_analytic import albedo, pairs
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
 each_material = pytest.mark.parametrize("name", MATERIALS)

@@ -1,0 +1,30 @@
+"""Damaged files of every format are refused in one line or do no harm; memory stays within bounds."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+
+import pytest
+
+from tests.io import corruption, files
+
+
+@pytest.mark.parametrize(("suffix", "make"), [(".bvb", files.bvb), (".bsdf", files.bsdf), (".binary", files.merl)])
+def test_200_damaged_files_are_refused_or_harmless(suffix: str, make: Callable[[], bytes]):
+    command = [sys.executable, "-m", "tests.io.corruption", suffix, "200", "7"]
+    done = subprocess.run(command, input=make(), capture_output=True, timeout=400, check=False)
+    assert done.returncode == 0, done.stderr.decode()[-2000:]
+    told = json.loads(done.stdout)
+    assert set(told["outcomes"]) <= {"refused", "harmless"}
+    assert told["outcomes"]["refused"] > 50
+    assert told["peak_mb"] < 1024
+
+
+def test_the_generator_is_deterministic_and_damages():
+    content = files.bsdf()
+    first, again = (list(corruption.corruptions(content, 100, 3)) for _ in range(2))
+    assert first == again
+    changed = [d != content if isinstance(d, bytes) else content[d[0] : d[0] + len(d[1])] != d[1] for d in first]
+    assert sum(changed) > 80
+    assert sum(isinstance(d, bytes) for d in first) > 20
