@@ -114,7 +114,6 @@ def _pictures(out: Path, measured: Any, models: dict[str, Any]) -> dict[str, Any
 def _screenshot(out: Path, measured: Any, model: Any) -> bool:
     """Draw volume and lobes where OpenGL allows it; say why where it does not."""
     import bvbedit_gui
-
     from bvbedit.errors import BvbError
 
     _tell("Drawing volume and lobes")

@@ -97,7 +97,6 @@ def view(model: Path, /, *, screenshot: Path, measured: Path | None = None, as_j
         Print one JSON object.
     """
     import bvbedit_gui
-
     from bvbedit import api
     from bvbedit.brdf.spline_brdf import SplineBrdf
     from bvbedit.errors import BvbError
