@@ -16,7 +16,7 @@ FITS: dict[str, tuple[str, dict[str, Any]]] = {
     "half-diff": ("half-diff, root, 48 KiB", {"chart": "half-diff", "encoding": "root"}),
 }
 PICTURE: dict[str, Any] = {"width": 320, "height": 320, "spp": 64}
-AMPLIFIED = 8
+AMPLIFIED = 32
 
 
 def demo(*, out: Path = Path("bvbedit-demo"), as_json: Json = False) -> None:

@@ -12,6 +12,8 @@ from bvbedit.brdf.charts import HALF_DIFF, IN_OUT, RUSINKIEWICZ, Chart, grid_poi
 from bvbedit.brdf.encodings import Encoding, Linear, Log, Root
 from bvbedit.brdf.fit import LARGEST_REFLECTANCE, fit_net, sample
 from bvbedit.brdf.geometry import spherical
+from bvbedit.brdf.goniophotometer import measure
+from bvbedit.brdf.materials import material_named
 from bvbedit.brdf.measured import MeasuredBrdf
 from bvbedit.brdf.spline_brdf import SplineBrdf, face_spread, keep_faces
 from bvbedit.spline.knots import place_knots
@@ -174,6 +176,16 @@ def test_cells_near_grazing_have_no_influence_either(rng):
     first, second = (m.evaluate(wi, wo) for m in models)
     np.testing.assert_allclose(first, second, rtol=0, atol=2e-3 * first.max())
     assert models[0].report["without_data"] == pytest.approx(grazing.mean())
+
+
+def test_beyond_the_data_a_model_stays_near_the_held_values(rng):
+    """Left to itself a net runs wild where nothing holds it: this one rose to more than 500 times the held values."""
+    table = measure(material_named("gold-metallic-paint").brdf, "merl", noise=0.05, seed=1)
+    model = fit_net(table, HALF_DIFF, Root(), size=(45, 18, 5))
+    wi = spherical(rng.uniform(0, np.pi / 2, 20_000), 0.0)
+    wo = spherical(rng.uniform(np.radians(85), np.radians(89.9), 20_000), rng.uniform(0, 2 * np.pi, 20_000))
+    fitted, held = (np.linalg.norm(b.evaluate(wi, wo), axis=1) + 1e-3 for b in (model, table))
+    assert (fitted / held).max() < 10
 
 
 @pytest.mark.parametrize("encoding", [Root(), Log(), Linear()], ids=repr)
