@@ -150,6 +150,8 @@ def test_export_agrees_with_the_model_at_its_nodes(run, folder, tmp_path, suffix
 
     points = grid_points(table.axes)[table.valid.reshape(-1)][::997]
     wi, wo = table.chart.to_directions(points)
+    # Nodes on the horizon are looked up from just above it.
+    wi, wo = (w[np.minimum(wi[:, 2], wo[:, 2]) > 1e-2] for w in (wi, wo))
     np.testing.assert_allclose(table.evaluate(wi, wo), model.evaluate(wi, wo), rtol=2e-3, atol=1e-6)
 
 
