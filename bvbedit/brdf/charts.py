@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from bvbedit.brdf.geometry import Floats
 from bvbedit.errors import BvbError
+from bvbedit.spline.arguments import shown
 
 HALF_PI = np.pi / 2
 
@@ -197,10 +198,9 @@ FITTING_CHARTS = (IN_OUT.name, HALF_DIFF.name)
 
 def chart_named(name: str) -> Chart:
     """Return the chart called ``name``. Raises BvbError that lists the names where there is none."""
-    try:
-        return CHARTS[name]
-    except (KeyError, TypeError):
-        raise BvbError(f"Unknown chart {name!r}. Choose one of {', '.join(CHARTS)}.") from None
+    if not isinstance(name, str) or name not in CHARTS:
+        raise BvbError(f"Unknown chart {shown(name)}. Choose one of {', '.join(CHARTS)}.")
+    return CHARTS[name]
 
 
 def grid_points(axes: tuple[ArrayLike, ...]) -> Floats:

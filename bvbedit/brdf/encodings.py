@@ -2,13 +2,14 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 
 from bvbedit.brdf.geometry import Floats
 from bvbedit.errors import BvbError
+from bvbedit.spline.arguments import is_real_within, shown
 
 # A wild control point decodes to a huge reflectance, not to infinity, which would spread over a whole picture.
 LARGEST = 1e290
@@ -53,7 +54,7 @@ class Root(Encoding):
     name = "root"
 
     def __post_init__(self) -> None:
-        _check_parameter(self.name, "k", self.k, 1.0, 16.0)
+        object.__setattr__(self, "k", _checked(self.name, "k", self.k, 1.0, 16.0))
 
     def encode(self, f: Floats) -> Floats:
         f = np.clip(f, 0.0, LARGEST)
@@ -72,7 +73,7 @@ class Log(Encoding):
     name = "log"
 
     def __post_init__(self) -> None:
-        _check_parameter(self.name, "eps", self.eps, 1e-12, 1e6)
+        object.__setattr__(self, "eps", _checked(self.name, "eps", self.eps, 1e-12, 1e6))
 
     def encode(self, f: Floats) -> Floats:
         return np.log1p(np.clip(f, 0.0, LARGEST) / self.eps)
@@ -81,9 +82,12 @@ class Log(Encoding):
         return self.eps * np.expm1(np.clip(y, 0.0, np.log1p(LARGEST / self.eps)))
 
 
-def _check_parameter(encoding: str, name: str, value: float, lowest: float, highest: float) -> None:
-    if not isinstance(value, int | float) or isinstance(value, bool) or not lowest <= value <= highest:
-        raise BvbError(f"{encoding} encoding: {name} is {value!r}. It must be a number in {lowest:g} ... {highest:g}.")
+def _checked(encoding: str, name: str, value: float, lowest: float, highest: float) -> float:
+    if not is_real_within(value, lowest, highest):
+        raise BvbError(
+            f"{encoding} encoding: {name} is {shown(value)}. It must be a number in {lowest:g} ... {highest:g}."
+        )
+    return float(value)
 
 
 ENCODINGS: dict[str, type[Encoding]] = {e.name: e for e in (Linear, Root, Log)}
@@ -96,11 +100,14 @@ def encoding_named(name: str) -> Encoding:
 
 def encoding_from_dict(description: Mapping[str, Any]) -> Encoding:
     """Return the encoding that ``to_dict`` described. Raises BvbError for an unknown name or a bad parameter."""
+    if not isinstance(description, Mapping):
+        raise BvbError(f"{shown(description)} describes no encoding. Give its name and parameters, as to_dict does.")
     parameters = dict(description)
     name = parameters.pop("name", None)
     if not isinstance(name, str) or name not in ENCODINGS:
-        raise BvbError(f"Unknown encoding {name!r}. Choose one of {', '.join(ENCODINGS)}.")
+        raise BvbError(f"Unknown encoding {shown(name)}. Choose one of {', '.join(ENCODINGS)}.")
     try:
         return ENCODINGS[name](**parameters)
     except TypeError:
-        raise BvbError(f"Encoding {name} has no parameters {sorted(parameters)}. See its description.") from None
+        known = ", ".join(f.name for f in fields(ENCODINGS[name])) or "none"  # type: ignore[arg-type]
+        raise BvbError(f"Encoding {name} has no parameters {shown(list(parameters))}. It has {known}.") from None

@@ -13,8 +13,9 @@ from bvbedit.brdf.charts import IN_OUT, Chart, grid_points
 from bvbedit.brdf.encodings import Encoding, Linear
 from bvbedit.brdf.geometry import Bools, Floats
 from bvbedit.brdf.measured import MeasuredBrdf, hold
-from bvbedit.brdf.spline_brdf import SplineBrdf, keep_faces
+from bvbedit.brdf.spline_brdf import SplineBrdf, check_fitting_chart, keep_faces
 from bvbedit.errors import BvbError
+from bvbedit.spline.arguments import one_per_axis
 from bvbedit.spline.fitting import fit_weighted, loft
 from bvbedit.spline.knots import place_knots
 
@@ -62,8 +63,10 @@ def fit_net(
     free faces (Lee & Park 2008). Raises BvbError where size and degrees do not suit each other or the data.
     """
     start = perf_counter()
+    check_fitting_chart(chart)
+    size, degrees = one_per_axis(size, "Size"), one_per_axis(degrees, "Degrees")
     if len(size) != 3 or len(degrees) != 3:
-        raise BvbError(f"Size {tuple(size)} and degrees {tuple(degrees)}: give three numbers each, one for each axis.")
+        raise BvbError(f"Size {size} and degrees {degrees} are not three numbers each. Give one for each axis.")
     published = chart is IN_OUT and isinstance(encoding, Linear) and knots == "piegl-tiller"
     samples = sample(brdf, chart, encoding, partners=not published)
     vectors = [place_knots(knots, u, n, p) for u, n, p in zip(samples.axes, size, degrees, strict=True)]
@@ -137,7 +140,10 @@ def sample(brdf: Brdf, chart: Chart, encoding: Encoding, *, partners: bool = Tru
 
 def _checked(samples: Samples) -> Samples:
     if not samples.weights.any():
-        raise BvbError("No node of the chart has data behind it: the valid cells are too few or all near grazing.")
+        raise BvbError(
+            "No node of the chart has data behind it: the valid cells are too few or all near grazing. "
+            "Measure, or mark valid, more of the table."
+        )
     return samples
 
 

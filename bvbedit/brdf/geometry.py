@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bvbedit.errors import BvbError
+from bvbedit.spline.arguments import real_array
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -18,7 +19,7 @@ def unit_directions(value: ArrayLike, name: str) -> Floats:
 
     Raises BvbError where the shape is not (..., 3) or a vector is zero, nan or infinite.
     """
-    w = np.asarray(value, dtype=np.float64)
+    w = real_array(value, name)
     if w.ndim == 0 or w.shape[-1] != 3:
         raise BvbError(f"{name} has shape {w.shape}. Directions need a last axis of 3 components.")
     # Divided by the largest component first, so that neither 1e-300 nor 1e300 spoils the square.

@@ -11,6 +11,7 @@ from bvbedit.brdf.charts import HALF_DIFF, IN_OUT, RUSINKIEWICZ, Chart, grid_poi
 from bvbedit.brdf.geometry import Floats
 from bvbedit.brdf.measured import MeasuredBrdf
 from bvbedit.errors import BvbError
+from bvbedit.spline.arguments import is_real_within, is_whole, shown
 
 
 @dataclass(frozen=True)
@@ -63,12 +64,12 @@ def measure(brdf: Brdf, grid: str = "merl", noise: float = 0.0, seed: int = 0) -
 
     Raises BvbError for an unknown grid, noise outside [0, 1] or a seed that is not a whole number >= 0.
     """
-    if grid not in GRIDS:
-        raise BvbError(f"Unknown grid {grid!r}. Choose one of {', '.join(GRIDS)}.")
-    if not 0 <= noise <= 1:
-        raise BvbError(f"noise is {noise!r}. Give a relative standard deviation from 0 to 1.")
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-        raise BvbError(f"seed is {seed!r}. Give a whole number from 0 up.")
+    if not isinstance(grid, str) or grid not in GRIDS:
+        raise BvbError(f"Unknown grid {shown(grid)}. Choose one of {', '.join(GRIDS)}.")
+    if not is_real_within(noise, 0, 1):
+        raise BvbError(f"noise is {shown(noise)}. Give a relative standard deviation from 0 to 1.")
+    if not is_whole(seed) or seed < 0:
+        raise BvbError(f"seed is {shown(seed)}. Give a whole number from 0 up.")
     where = GRIDS[grid]
     shape = tuple(len(a) for a in where.axes)
     values, valid = np.zeros((*shape, 3)), np.zeros(shape, dtype=bool)

@@ -22,6 +22,7 @@ from bvbedit.brdf.analytic import (
     Ward,
 )
 from bvbedit.errors import BvbError
+from bvbedit.spline.arguments import shown
 
 
 @dataclass(frozen=True)
@@ -120,7 +121,6 @@ MATERIALS: Mapping[str, Material] = MappingProxyType({m.name: m for m in _ALL})
 
 def material_named(name: str) -> Material:
     """Return the sample material called ``name``. Raises BvbError that lists the names where there is none."""
-    try:
-        return MATERIALS[name]
-    except (KeyError, TypeError):
-        raise BvbError(f"Unknown material {name!r}. Choose one of {', '.join(MATERIALS)}.") from None
+    if not isinstance(name, str) or name not in MATERIALS:
+        raise BvbError(f"Unknown material {shown(name)}. Choose one of {', '.join(MATERIALS)}.")
+    return MATERIALS[name]

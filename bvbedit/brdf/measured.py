@@ -9,9 +9,13 @@ from bvbedit.brdf.base import Brdf
 from bvbedit.brdf.charts import Chart
 from bvbedit.brdf.geometry import Bools, Floats
 from bvbedit.errors import BvbError
+from bvbedit.spline.arguments import one_per_axis, real_array
+from bvbedit.spline.knots import increasing
 
 # Between nodes the table is linear in log(1 + SCALE f): peaks of 1e4 beside 1e-3 ask for a logarithm.
 SCALE = 1000.0
+# SCALE times a larger value would leave the range of float64.
+LARGEST = 1e300
 LOG_BLOCK = 1 << 14
 
 
@@ -24,16 +28,16 @@ class MeasuredBrdf(Brdf):
     ``values`` has zeros there, ``filled`` what is evaluated.
     Negative values count as zero; ``clamped`` is their share among the valid ones. The arrays are kept read-only.
 
-    Raises BvbError for shapes that do not fit, axes that do not increase, values that are not finite in valid cells,
-    and tables without a valid cell.
+    Raises BvbError for shapes that do not fit, axes that do not increase, values beyond 1e300 or not finite in valid
+    cells, and tables without a valid cell.
     """
 
     reliable_elevation = float(np.radians(85.0))
 
     def __init__(self, values: ArrayLike, valid: ArrayLike, axes: tuple[ArrayLike, ...], chart: Chart) -> None:
-        table = np.array(values, dtype=np.float64, order="C")
-        mask = np.array(valid, dtype=bool, order="C")
-        nodes = tuple(np.array(a, dtype=np.float64) for a in axes)
+        table = np.array(real_array(values, "Table values"), order="C")
+        mask = np.array(real_array(valid, "Table valid", bool), order="C")
+        nodes = tuple(np.array(real_array(a, "Table axis")) for a in one_per_axis(axes, "Table axes"))
         shape = tuple(len(a) if a.ndim == 1 else -1 for a in nodes)
         if len(nodes) != 3 or min(shape) < 1 or table.shape != (*shape, 3) or mask.shape != shape:
             raise BvbError(
@@ -41,18 +45,19 @@ class MeasuredBrdf(Brdf):
                 "Give values (n0, n1, n2, 3), valid (n0, n1, n2) and three axes of n0, n1 and n2 nodes."
             )
         for name, a in zip(chart.axes, nodes, strict=True):
-            if not (np.isfinite(a).all() and a[0] >= 0 and a[-1] <= 1 and (np.diff(a) > 0).all()):
+            if not (increasing(a) and a[0] >= 0 and a[-1] <= 1):
                 raise BvbError(f"The table's {name} axis is not increasing in [0, 1]. Give chart parameters in order.")
         count = int(np.count_nonzero(mask))
         if count == 0:
             raise BvbError("Not one cell of the table is valid. There is nothing to evaluate or fit.")
         if count < mask.size:
             table[~mask] = 0.0
-        if not np.isfinite(table).all():
-            where = tuple(int(i) for i in np.argwhere(~np.isfinite(table))[0][:3])
+        lowest, highest = table.min(), table.max()
+        if not -LARGEST <= lowest <= highest <= LARGEST:  # false for nan too
+            where = tuple(int(i) for i in np.argwhere(~(np.abs(table) <= LARGEST))[0][:3])
             raise BvbError(f"Table cell {where} holds {table[where].tolist()}. Mark it invalid.")
         self.clamped = 0.0
-        if table.min() < 0:
+        if lowest < 0:
             self.clamped = float(np.count_nonzero(table < 0)) / (3 * count)
             np.maximum(table, 0.0, out=table)
         for a in (table, mask, *nodes):

@@ -14,10 +14,14 @@ from bvbedit.brdf.charts import RUSINKIEWICZ, Rusinkiewicz, grid_points
 from bvbedit.brdf.fit import HORIZON_MARGIN, LARGEST_REFLECTANCE
 from bvbedit.brdf.geometry import Floats, spherical
 from bvbedit.brdf.measured import MeasuredBrdf
+from bvbedit.errors import BvbError
+from bvbedit.spline.arguments import is_whole, shown
 
 HIGHEST_ELEVATION = np.radians(80.0)
 # Nodes at 80 degrees belong to the grid: rounding must not decide.
 MARGIN = 1e-9
+# Each meets 45 degrees, and both ends of every axis of the paper's grid.
+STRIDES = (1, 3, 5, 9, 15, 45)
 
 
 @dataclass(frozen=True)
@@ -84,7 +88,10 @@ def compare(a: Brdf, b: Brdf, *, stride: int = 1, progress: Callable[[float], No
     The nodes are the valid ones of ``b`` where it is a MERL table, else all MERL nodes with phi_d in steps of 2
     degrees; both elevations under 80 degrees. A ``stride`` (a divisor of 45) takes every so many-th node of each axis
     only: 5 is a hundred times quicker and tells the means to a few percent. ``progress`` is called with the share done.
+    Raises BvbError for another stride.
     """
+    if not is_whole(stride) or stride not in STRIDES:
+        raise BvbError(f"stride is {shown(stride)}. Choose one of {', '.join(map(str, STRIDES))}.")
     grid, nodes = _Sums(), _Sums()
     theta = np.minimum(np.radians(np.arange(0.0, 91.0, stride)), np.pi / 2 - HORIZON_MARGIN)
     phi = np.radians(np.arange(0, 361, stride) * 0.5)

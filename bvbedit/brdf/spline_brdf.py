@@ -29,8 +29,7 @@ class SplineBrdf(Brdf):
     ) -> None:
         if spline.parameters != 3 or spline.channels != 3 or spline.domain != ((0.0, 1.0),) * 3:
             raise BvbError(f"{spline!r} on {spline.domain} is no BRDF. Give 3 parameters on [0, 1] and 3 channels.")
-        if chart.name not in FITTING_CHARTS:
-            raise BvbError(f"Chart {chart.name!r} is for tables only. A model lives in {' or '.join(FITTING_CHARTS)}.")
+        check_fitting_chart(chart)
         self.spline = spline
         self.chart = chart
         self.encoding = encoding
@@ -51,6 +50,12 @@ class SplineBrdf(Brdf):
     def _evaluate(self, wi: Floats, wo: Floats) -> tuple[Floats, Bools]:
         f = self.encoding.decode(self.spline.evaluate(self.chart.to_parameters(wi, wo)))
         return f, np.ones(len(f), dtype=bool)
+
+
+def check_fitting_chart(chart: Chart) -> None:
+    """Raise BvbError for a chart that only tables have."""
+    if chart.name not in FITTING_CHARTS:
+        raise BvbError(f"Chart {chart.name!r} is for tables only. A model lives in {' or '.join(FITTING_CHARTS)}.")
 
 
 def payload_bytes(size: Sequence[int], degrees: Sequence[int], precision: str) -> int:

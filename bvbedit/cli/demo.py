@@ -118,7 +118,7 @@ def _screenshot(out: Path, measured: Any, model: Any) -> bool:
 
     _tell("Drawing volume and lobes")
     try:
-        bvbedit_gui.screenshot(model, out / "volume.png", measured=measured, title=f"{MATERIAL}, half-diff")
+        bvbedit_gui.screenshot(model, out / "volume.png", measured=measured, title=MATERIAL)
     except BvbError as error:
         _tell(f"No volume.png: {error}")
         return False

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from bvbedit.errors import BvbError
+from bvbedit.spline.arguments import is_real_within, one_per_axis, real_array, shown
 from bvbedit.spline.banded import Banded
 from bvbedit.spline.basis import collocation
-from bvbedit.spline.knots import Floats
+from bvbedit.spline.knots import Floats, checked_knots, increasing
 from bvbedit.spline.tensor import TensorSpline
 
 # Condition of an axis' collocation matrix beyond which coefficients lose half of their 16 digits to the knots.
@@ -23,6 +24,8 @@ CONDITION_LIMIT = 1e8
 PENALTY = 1e-9
 # A dense factor of one axis, m x n doubles, may take this many (256 MiB).
 LARGEST_FACTOR = 1 << 25
+# Rounding lets no gradient shrink much further than this.
+SMALLEST_TOLERANCE = 1e-15
 # Marginal weights below this share of the largest are raised to it in the preconditioner, which must be invertible.
 MARGINAL_FLOOR = 1e-4
 
@@ -86,10 +89,10 @@ def loft(values: Floats, parameters: Sequence[Floats], knots: Sequence[Floats], 
     """Return the least-squares spline to ``values`` (m_1, ..., m_d, c) on a grid, all with equal weight.
 
     ``parameters`` are the d increasing grid axes (m_a,), ``knots`` d full clamped knot vectors over them.
-    Raises BvbError where the shapes do not match, values are not finite, or an axis has more control points than data.
-    Source: Lee & Park (2008), section 3.2.
+    Raises BvbError where the shapes do not match, values are not finite, nodes do not increase within the knots, or an
+    axis has more control points than data. Source: Lee & Park (2008), section 3.2.
     """
-    _check_data(values, parameters, knots, degrees)
+    values, parameters, knots, degrees = _checked_data(values, parameters, knots, degrees)
     axes = [fit_axis(u, t, p) for u, t, p in zip(parameters, knots, degrees, strict=True)]
     control = _along_all([a.pseudo_inverse for a in axes], values)
     return FitResult(TensorSpline(degrees, knots, control), tuple(a.condition for a in axes), _penalty_notes(axes))
@@ -116,14 +119,21 @@ def fit_weighted(
     W A, preconditioned by the separable inverse that the marginals of W give, until the preconditioned gradient has
     shrunk to ``tolerance`` of the right-hand side's.
 
-    Raises BvbError as ``loft`` does, for weights that are negative, not finite or all zero, and another start.
+    Raises BvbError as ``loft`` does, for weights that are negative, not finite or all zero, another start, and a
+    tolerance outside [1e-15, 1].
     """
-    _check_data(values, parameters, knots, degrees)
+    values, parameters, knots, degrees = _checked_data(values, parameters, knots, degrees)
     size = tuple(len(t) - p - 1 for t, p in zip(knots, degrees, strict=True))
+    start, weights = real_array(start, "Start"), real_array(weights, "Weights")
     if start.shape != (*size, values.shape[-1]) or not np.isfinite(start).all():
         raise BvbError(f"The start {start.shape} is no net of size {size} with finite values. Start from a lofted net.")
-    if weights.shape != values.shape[:-1] or not np.isfinite(weights).all() or weights.min() < 0 or not weights.any():
-        raise BvbError("Weights must be finite, >= 0, not all zero, and have the shape of the data without channels.")
+    if weights.shape != values.shape[:-1] or not np.isfinite(weights).all() or not weights.any() or weights.min() < 0:
+        raise BvbError(
+            f"Weights of shape {weights.shape} cannot weigh these data. "
+            f"Give finite weights >= 0 of shape {values.shape[:-1]}, not all zero."
+        )
+    if not is_real_within(tolerance, SMALLEST_TOLERANCE, 1.0):
+        raise BvbError(f"Tolerance {shown(tolerance)} cannot end a fit. Choose one in {SMALLEST_TOLERANCE:g} ... 1.")
     weights = weights / weights.max()
     d = len(degrees)
     axes = []
@@ -135,12 +145,12 @@ def fit_weighted(
     inverses = [a.inverse_normal for a in axes]
 
     right = weights[..., None] * values
+    # Sums and squares of extreme data leave the range of float64: the iteration works on numbers of order one.
+    exponent = int(np.frexp(max(right.max(), -right.min(), float(np.abs(start).max())))[1])
+    np.ldexp(right, -exponent, out=right)
     for a in range(d):
         right = matrices[a].apply_transposed(right, a)
     right = project(right)
-    # The squares of extreme data leave the range of float64: the iteration works on nets of order one.
-    exponent = int(np.frexp(max(float(np.abs(right).max()), float(np.abs(start).max())))[1])
-    right = np.ldexp(right, -exponent)
 
     def precondition(r: Floats) -> Floats:
         return project(_along_all(inverses, r))
@@ -213,15 +223,30 @@ def _penalty_notes(axes: Sequence[AxisFit]) -> tuple[str, ...]:
     )
 
 
-def _check_data(values: Floats, parameters: Sequence[Floats], knots: Sequence[Floats], degrees: Sequence[int]) -> None:
-    shape = tuple(len(u) for u in parameters)
-    if not len(parameters) == len(knots) == len(degrees) or values.ndim != len(shape) + 1 or values.shape[:-1] != shape:
-        raise BvbError(f"Data {values.shape} do not lie on a grid of {shape} nodes with {len(degrees)} degrees.")
-    for axis, (u, t) in enumerate(zip(parameters, knots, strict=True)):
-        if not (np.isfinite(u).all() and u.min() >= t[0] and u.max() <= t[-1]):
+def _checked_data(
+    values: Floats, parameters: Sequence[Floats], knots: Sequence[Floats], degrees: Sequence[int]
+) -> tuple[Floats, tuple[Floats, ...], tuple[Floats, ...], tuple[int, ...]]:
+    """Return the data, grid axes, knots and degrees of a fit as arrays that suit one another."""
+    values = real_array(values, "Data")
+    degrees = one_per_axis(degrees, "Degrees")
+    nodes = tuple(np.atleast_1d(real_array(u, "Nodes")) for u in one_per_axis(parameters, "Nodes"))
+    vectors = one_per_axis(knots, "Knot vectors")
+    shape = tuple(u.size for u in nodes)
+    if values.size == 0 or values.shape[:-1] != shape or not len(shape) == len(vectors) == len(degrees):
+        raise BvbError(
+            f"Data {values.shape} do not lie on a grid of {shape} nodes with {len(vectors)} knot vectors and "
+            f"{len(degrees)} degrees. Give values (m_1, ..., m_d, channels), and one of each for every axis."
+        )
+    vectors = tuple(checked_knots(t, p) for t, p in zip(vectors, degrees, strict=True))
+    for axis, (u, t) in enumerate(zip(nodes, vectors, strict=True)):
+        if not ((u >= t[0]) & (u <= t[-1])).all():  # false for nan too
             raise BvbError(
                 f"Nodes of axis {axis} lie outside the knots' [{t[0]:g}, {t[-1]:g}]. Knots must span the data."
             )
+        # Coinciding nodes would leave null vectors that not even the penalty tames.
+        if u.ndim != 1 or not increasing(u):
+            raise BvbError(f"Nodes of axis {axis} do not increase. Give each node once, in order.")
     if not np.isfinite(values).all():
         where = tuple(int(i) for i in np.argwhere(~np.isfinite(values))[0])
         raise BvbError(f"Datum {where} is {values[where]}. Fill or leave out what is not finite.")
+    return values, nodes, vectors, degrees

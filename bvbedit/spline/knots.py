@@ -1,12 +1,12 @@
 """Knot vectors: full, clamped, validated; where their knots are placed; Greville abscissae."""
 
 from collections.abc import Callable
-from numbers import Integral
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bvbedit.errors import BvbError
+from bvbedit.spline.arguments import is_whole, real_array, shown
 
 Floats = NDArray[np.float64]
 MAX_DEGREE = 16
@@ -17,9 +17,14 @@ SMALLEST_GAP = 1e-100
 
 def checked_degree(degree: object) -> int:
     """Return ``degree`` as int. Raises BvbError outside 0 ... 16."""
-    if isinstance(degree, bool) or not isinstance(degree, Integral) or int(degree) not in range(MAX_DEGREE + 1):
-        raise BvbError(f"Degree {degree!r} is not supported. Choose a whole number in 0 ... {MAX_DEGREE}.")
+    if not is_whole(degree) or not 0 <= degree <= MAX_DEGREE:
+        raise BvbError(f"Degree {shown(degree)} is not supported. Choose a whole number in 0 ... {MAX_DEGREE}.")
     return int(degree)
+
+
+def increasing(u: Floats) -> bool:
+    """Return whether the row ``u`` (m,) is finite and each number larger than the one before."""
+    return bool(np.isfinite(u).all() and (np.diff(u) > 0).all())
 
 
 def checked_knots(knots: ArrayLike, degree: int) -> Floats:
@@ -29,9 +34,9 @@ def checked_knots(knots: ArrayLike, degree: int) -> Floats:
     degree - 1 control points belong to it. Raises BvbError that names the first offending index and value.
     """
     p = checked_degree(degree)
-    t = np.array(knots, dtype=np.float64)
+    t = np.array(real_array(knots, "Knots"))
     if t.ndim != 1 or len(t) < 2 * (p + 1):
-        raise BvbError(f"A knot vector of degree {p} needs at least {2 * (p + 1)} knots in one row, got {t.shape}.")
+        raise BvbError(f"Knots have shape {t.shape}. Degree {p} needs at least {2 * (p + 1)} knots in one row.")
     wild = ~(np.abs(t) <= LARGEST_KNOT)
     if wild.any():
         i = int(np.flatnonzero(wild)[0])
@@ -46,7 +51,7 @@ def checked_knots(knots: ArrayLike, degree: int) -> Floats:
             f"Knots {i} and {i + 1} are {gaps[i]:g} apart. Make them equal, or {SMALLEST_GAP:g} or more apart."
         )
     if t[0] != t[p] or t[-1] != t[-p - 1]:
-        raise BvbError(f"The knot vector is not clamped: repeat the first and the last knot {p + 1} times.")
+        raise BvbError(f"The knot vector is not clamped. Repeat the first and the last knot {p + 1} times.")
     over = np.flatnonzero(t[p + 1 :] == t[: -p - 1])
     if len(over):
         raise BvbError(f"Knot {over[0]} = {t[over[0]]} stands more than {p + 1} times. Degree {p} allows no more.")
@@ -57,7 +62,10 @@ def checked_knots(knots: ArrayLike, degree: int) -> Floats:
 def clamped(interior: ArrayLike, degree: int, start: float = 0.0, end: float = 1.0) -> Floats:
     """Return the full clamped knot vector with the given ``interior`` knots on [start, end]."""
     p = checked_degree(degree)
-    return checked_knots(np.concatenate([[start] * (p + 1), np.asarray(interior, float), [end] * (p + 1)]), p)
+    left, inside, right = (real_array(part, "Knots") for part in ([start] * (p + 1), interior, [end] * (p + 1)))
+    if inside.ndim != 1:
+        raise BvbError(f"Interior knots have shape {inside.shape}. Give them in one row.")
+    return checked_knots(np.concatenate([left, inside, right]), p)
 
 
 def greville(knots: Floats, degree: int) -> Floats:
@@ -106,14 +114,16 @@ def place_knots(placement: str, parameters: ArrayLike, size: int, degree: int) -
     cannot carry.
     """
     p = checked_degree(degree)
-    u = np.asarray(parameters, dtype=np.float64)
-    if u.ndim != 1 or len(u) < 2 or not np.isfinite(u).all() or not (np.diff(u) > 0).all():
-        raise BvbError("Data parameters must be at least two finite numbers in increasing order.")
-    if not p + 1 <= size <= len(u):
+    u = real_array(parameters, "Data parameters")
+    if u.ndim != 1 or len(u) < 2 or not increasing(u):
         raise BvbError(
-            f"{size} control points cannot be placed over {len(u)} data at degree {p}. "
-            f"Choose a size in {p + 1} ... {len(u)}."
+            f"Data parameters of shape {u.shape} are no increasing row. Give at least two finite numbers in order."
         )
-    if placement not in PLACEMENTS:
-        raise BvbError(f"Unknown knot placement {placement!r}. Choose one of {', '.join(PLACEMENTS)}.")
+    if not is_whole(size) or not p + 1 <= size <= len(u):
+        raise BvbError(
+            f"{shown(size)} control points cannot be placed over {len(u)} data at degree {p}. "
+            f"Choose a whole number in {p + 1} ... {len(u)}."
+        )
+    if not isinstance(placement, str) or placement not in PLACEMENTS:
+        raise BvbError(f"Unknown knot placement {shown(placement)}. Choose one of {', '.join(PLACEMENTS)}.")
     return clamped(PLACEMENTS[placement](u, size, p), p, u[0], u[-1])

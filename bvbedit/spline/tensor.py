@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 from functools import cached_property
 from math import factorial
-from numbers import Integral
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bvbedit.errors import BvbError
+from bvbedit.spline.arguments import is_whole, one_per_axis, real_array, shown
 from bvbedit.spline.banded import Banded
 from bvbedit.spline.basis import basis_derivatives, collocation, find_spans
 from bvbedit.spline.knots import Floats, checked_knots, greville
@@ -31,13 +31,15 @@ class TensorSpline:
     """
 
     def __init__(self, degrees: Sequence[int], knots: Sequence[ArrayLike], control: ArrayLike) -> None:
+        degrees, knots = one_per_axis(degrees, "Degrees"), one_per_axis(knots, "Knot vectors")
         if not 1 <= len(degrees) <= MAX_PARAMETERS or len(degrees) != len(knots):
             raise BvbError(
-                f"{len(degrees)} degrees and {len(knots)} knot vectors: give one of each for 1 ... 4 parameters."
+                f"{len(degrees)} degrees and {len(knots)} knot vectors are no spline. "
+                f"Give one of each for 1 ... {MAX_PARAMETERS} parameters."
             )
         self.knots: tuple[Floats, ...] = tuple(checked_knots(t, p) for t, p in zip(knots, degrees, strict=True))
         self.degrees: tuple[int, ...] = tuple(int(p) for p in degrees)
-        net = np.array(control, dtype=np.float64, order="C")
+        net = np.array(real_array(control, "Control points"), order="C")
         size = tuple(len(t) - p - 1 for t, p in zip(self.knots, self.degrees, strict=True))
         if net.ndim != len(size) + 1 or net.shape[:-1] != size or net.shape[-1] == 0:
             raise BvbError(f"Control points have shape {net.shape}. Knots and degrees ask for {size} and channels.")
@@ -91,7 +93,7 @@ class TensorSpline:
         """
         if derivatives is not None:
             return self._differentiated(derivatives).evaluate(points)
-        x = np.asarray(points, dtype=np.float64)
+        x = real_array(points, "Points")
         d = self.parameters
         if x.ndim == 0 or x.shape[-1] != d:
             raise BvbError(f"Points have shape {x.shape}. This spline needs a last axis of {d} parameters.")
@@ -112,11 +114,12 @@ class TensorSpline:
 
         Raises BvbError for parameters outside the domain or not finite, and for another number of axes.
         """
+        axes = one_per_axis(axes, "Grid axes")
         if len(axes) != self.parameters:
             raise BvbError(f"{len(axes)} grid axes given. This spline has {self.parameters} parameters.")
         matrices = []
         for axis, (given, t, p, (a, b)) in enumerate(zip(axes, self.knots, self.degrees, self.domain, strict=True)):
-            x = np.atleast_1d(np.asarray(given, dtype=np.float64))
+            x = np.atleast_1d(real_array(given, f"Grid axis {axis}"))
             if x.ndim != 1:
                 raise BvbError(f"Grid axis {axis} has shape {x.shape}. Give one row of parameters.")
             _check_inside(x, a, b, axis)
@@ -132,10 +135,10 @@ class TensorSpline:
 
         Past the degree it is the zero spline of degree 0. Raises BvbError for an unknown axis or a negative order.
         """
-        if axis not in range(self.parameters):
-            raise BvbError(f"Axis {axis} does not exist. Choose one of 0 ... {self.parameters - 1}.")
-        if not isinstance(order, Integral) or order < 0:
-            raise BvbError(f"Derivative order {order} is not a whole number >= 0.")
+        if not is_whole(axis) or axis not in range(self.parameters):
+            raise BvbError(f"Axis {shown(axis)} does not exist. Choose one of 0 ... {self.parameters - 1}.")
+        if not is_whole(order) or order < 0:
+            raise BvbError(f"Derivative order {shown(order)} is not possible. Choose a whole number >= 0.")
         spline = self
         for _ in range(order):
             spline = spline._derived(axis)
@@ -158,6 +161,7 @@ class TensorSpline:
         )
 
     def _differentiated(self, orders: Sequence[int]) -> "TensorSpline":
+        orders = one_per_axis(orders, "Derivative orders")
         if len(orders) != self.parameters:
             raise BvbError(f"{len(orders)} derivative orders given. This spline has {self.parameters} parameters.")
         spline = self

@@ -10,6 +10,7 @@ import numpy as np
 from bvbedit.brdf.base import Brdf
 from bvbedit.brdf.geometry import Bools, Floats
 from bvbedit.errors import BvbError
+from bvbedit.spline.arguments import is_real_within, shown
 
 Colour = float | Sequence[float]
 """One number for all three channels, or three numbers (linear RGB)."""
@@ -101,16 +102,16 @@ class Analytic(Brdf):
 def colour(model: str, name: str, value: Colour, low: float, high: float) -> tuple[float, float, float]:
     """Return ``value`` as three numbers. Raises BvbError unless all are finite and within [low, high]."""
     try:
-        numbers = tuple(float(v) for v in ([value] * 3 if isinstance(value, Real) else value))  # type: ignore[union-attr]
-    except (TypeError, ValueError):
+        numbers = (value,) * 3 if isinstance(value, Real) else tuple(value)  # type: ignore[arg-type]
+    except TypeError:
         numbers = ()
-    if len(numbers) != 3 or not all(low <= v <= high for v in numbers):
-        raise BvbError(f"{model}: {name} is {value!r}. Give one number or three (RGB) from {low:g} to {high:g}.")
-    return numbers[0], numbers[1], numbers[2]
+    if len(numbers) != 3 or not all(is_real_within(v, low, high) for v in numbers):
+        raise BvbError(f"{model}: {name} is {shown(value)}. Give one number or three (RGB) from {low:g} to {high:g}.")
+    return float(numbers[0]), float(numbers[1]), float(numbers[2])
 
 
 def number(model: str, name: str, value: float, low: float, high: float) -> float:
     """Return ``value`` as a float. Raises BvbError unless it is a number within [low, high]."""
-    if isinstance(value, bool) or not isinstance(value, Real) or not low <= float(value) <= high:
-        raise BvbError(f"{model}: {name} is {value!r}. Give a number from {low:g} to {high:g}.")
+    if not is_real_within(value, low, high):
+        raise BvbError(f"{model}: {name} is {shown(value)}. Give a number from {low:g} to {high:g}.")
     return float(value)

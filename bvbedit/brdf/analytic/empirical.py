@@ -10,6 +10,7 @@ import numpy as np
 from bvbedit.brdf.analytic.common import ROUGHNESS, Analytic, Colour, Pair, colour, number
 from bvbedit.brdf.geometry import Floats
 from bvbedit.errors import BvbError
+from bvbedit.spline.arguments import shown
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ class Lafortune(Analytic):
         except TypeError:
             lobes = ()
         if not lobes or not all(isinstance(lobe, CosineLobe) for lobe in lobes):
-            raise BvbError(f"Lafortune: lobes is {self.lobes!r}. Give a list of one or more CosineLobe.")
+            raise BvbError(f"Lafortune: lobes is {shown(self.lobes)}. Give a list of one or more CosineLobe.")
         object.__setattr__(self, "lobes", lobes)
         object.__setattr__(self, "diffuse", colour("Lafortune", "diffuse", self.diffuse, 0.0, 1.0))
 
@@ -116,7 +117,7 @@ class Ward(Analytic):
         object.__setattr__(self, "alpha", number("Ward", "alpha", self.alpha, *ROUGHNESS))
         if self.normalisation not in get_args(Normalisation):
             choices = ", ".join(get_args(Normalisation))
-            raise BvbError(f"Ward: normalisation is {self.normalisation!r}. Choose one of {choices}.")
+            raise BvbError(f"Ward: normalisation is {shown(self.normalisation)}. Choose one of {choices}.")
 
     def reflectance(self, pair: Pair) -> Floats:
         a2 = self.alpha**2

@@ -8,6 +8,7 @@ import numpy as np
 from bvbedit.brdf.analytic.common import Colour, colour
 from bvbedit.brdf.geometry import Floats
 from bvbedit.errors import BvbError
+from bvbedit.spline.arguments import shown
 
 
 class Fresnel(ABC):
@@ -80,4 +81,4 @@ def _exact(cos_d: Floats, eta: float, k: float) -> Floats:
 def checked_fresnel(model: str, value: object) -> None:
     """Raise BvbError unless ``value`` is a Fresnel term."""
     if not isinstance(value, Fresnel):
-        raise BvbError(f"{model}: fresnel is {value!r}. Give Schlick(f0) or ExactFresnel(eta, k).")
+        raise BvbError(f"{model}: fresnel is {shown(value)}. Give Schlick(f0) or ExactFresnel(eta, k).")

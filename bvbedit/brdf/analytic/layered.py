@@ -9,6 +9,7 @@ from bvbedit.brdf.analytic.common import Analytic, Colour, Pair, colour, number
 from bvbedit.brdf.analytic.microfacet import GGX
 from bvbedit.brdf.geometry import Floats
 from bvbedit.errors import BvbError
+from bvbedit.spline.arguments import shown
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,7 @@ class Coated(Analytic):
     def __post_init__(self) -> None:
         _models("Coated", [self.base])
         if not isinstance(self.coat, GGX):
-            raise BvbError(f"Coated: coat is {self.coat!r}. Give a GGX.")
+            raise BvbError(f"Coated: coat is {shown(self.coat)}. Give a GGX.")
         object.__setattr__(self, "cover", number("Coated", "cover", self.cover, 0.0, 1.0))
         object.__setattr__(self, "bend", number("Coated", "bend", self.bend, 1.0, 3.0))
 
@@ -78,5 +79,5 @@ class Coated(Analytic):
 def _models(model: str, parts: object) -> tuple[Analytic, ...]:
     found = tuple(parts) if isinstance(parts, Sequence) else ()
     if not found or not all(isinstance(part, Analytic) for part in found):
-        raise BvbError(f"{model}: {parts!r} are not analytic BRDFs. Give Lambert, GGX, Ward and the like.")
+        raise BvbError(f"{model}: {shown(parts)} are not analytic BRDFs. Give Lambert, GGX, Ward and the like.")
     return found
