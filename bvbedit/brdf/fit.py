@@ -15,7 +15,7 @@ from bvbedit.brdf.geometry import Bools, Floats
 from bvbedit.brdf.measured import MeasuredBrdf, hold
 from bvbedit.brdf.spline_brdf import SplineBrdf, check_fitting_chart, keep_faces
 from bvbedit.errors import BvbError
-from bvbedit.spline.arguments import one_per_axis
+from bvbedit.spline.arguments import one_per_axis, shown
 from bvbedit.spline.fitting import fit_weighted, loft
 from bvbedit.spline.knots import place_knots
 
@@ -66,7 +66,9 @@ def fit_net(
     check_fitting_chart(chart)
     size, degrees = one_per_axis(size, "Size"), one_per_axis(degrees, "Degrees")
     if len(size) != 3 or len(degrees) != 3:
-        raise BvbError(f"Size {size} and degrees {degrees} are not three numbers each. Give one for each axis.")
+        raise BvbError(
+            f"Size {shown(size)} and degrees {shown(degrees)} are not three numbers each. Give one for each axis."
+        )
     published = chart is IN_OUT and isinstance(encoding, Linear) and knots == "piegl-tiller"
     samples = sample(brdf, chart, encoding, partners=not published)
     vectors = [place_knots(knots, u, n, p) for u, n, p in zip(samples.axes, size, degrees, strict=True)]

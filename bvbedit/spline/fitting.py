@@ -180,8 +180,8 @@ def fit_weighted(
     residual = float(np.sqrt(max(rz, 0.0) / scale)) if scale > 0 else 0.0
     if rz > goal:
         notes += (f"stopped after {iterations} iterations with the gradient at {residual:.1e} of its scale",)
-    # Rounding has drifted from what ``project`` keeps.
-    spline = TensorSpline(degrees, knots, np.ldexp(project(x), exponent))
+    # Every step was projected, so that ``x`` needs no projection again.
+    spline = TensorSpline(degrees, knots, np.ldexp(x, exponent))
     return FitResult(spline, tuple(a.condition for a in axes), notes, iterations, residual)
 
 

@@ -22,7 +22,7 @@ from bvbedit.brdf.analytic import (
     Ward,
 )
 from bvbedit.brdf.geometry import spherical
-from bvbedit.errors import BvbError
+from tests.spline.refusals import refusal
 
 N = np.array([0.0, 0.0, 1.0])
 WHITE = Schlick(1.0)
@@ -204,12 +204,6 @@ def test_finite_at_every_extreme(model):
 
 
 @each_model
-def test_zero_below_the_horizon(model):
-    below = (0.1, 0.0, -1e-3)
-    assert (model.evaluate([below, N, below], [N, below, below]) == 0).all()
-
-
-@each_model
 def test_shapes_broadcast(model):
     wi, wo = pairs(12)
     f = model.evaluate(wi.reshape(3, 4, 3), wo[0])
@@ -372,17 +366,23 @@ def test_models_are_values():
         (lambda: Lambert(1.5), "Lambert: albedo is 1.5"),
         (lambda: Lambert((0.1, 0.2)), "albedo"),
         (lambda: Lambert("red"), "albedo"),
+        (lambda: Lambert("101"), "albedo"),
+        (lambda: Lambert(True), "albedo"),
+        (lambda: Lambert(10**400), "albedo"),
+        (lambda: Lambert(np.ones((40, 40))), "albedo"),
         (lambda: Lambert(None), "albedo"),
         (lambda: Lambert((0.1, math.nan, 0.2)), "nan"),
         (lambda: GGX(0.0, WHITE), "alpha is 0.0. Give a number from 0.0001 to 2"),
         (lambda: GGX(math.nan, WHITE), "alpha"),
         (lambda: GGX("0.1", WHITE), "alpha"),
+        (lambda: GGX(10**400, WHITE), "alpha"),
         (lambda: GGX(0.1, 0.5), "fresnel"),
         (lambda: CookTorrance(3.0, WHITE), "m is 3.0"),
         (lambda: CookTorrance(0.3, WHITE, diffuse=-0.1), "diffuse is -0.1"),
         (lambda: CookTorrance(0.3, None), "fresnel"),
         (lambda: Ward(0.5, math.inf), "alpha is inf"),
         (lambda: Ward(0.5, 0.1, 0, "duer"), "bounded, 1992"),
+        (lambda: Ward(0.5, 0.1, 0, ["1992"]), "bounded, 1992"),
         (lambda: Schlick(-0.1), "f0"),
         (lambda: ExactFresnel(0.0), "eta"),
         (lambda: ExactFresnel(1.5, -1), "k is -1"),
@@ -403,6 +403,4 @@ def test_models_are_values():
     ],
 )
 def test_wrong_parameters_are_named(build, words):
-    with pytest.raises(BvbError) as error:
-        build()
-    assert words in str(error.value)
+    assert words in refusal(build)

@@ -168,17 +168,17 @@ def test_the_meaning_of_phi_d():
         theta_h, theta_d, phi_d = np.radians(chart.angles(p).T)
         assert (phi_d == 0).all()
         wi, wo = chart.to_directions(p)
-        np.testing.assert_allclose(wi[:, 2], np.cos(theta_h + theta_d), atol=1e-15)
-        np.testing.assert_allclose(wo[:, 2], np.cos(theta_h - theta_d), atol=1e-15)
+        np.testing.assert_allclose(wi[:, 2], np.cos(theta_h + theta_d), rtol=0, atol=1e-15)
+        np.testing.assert_allclose(wo[:, 2], np.cos(theta_h - theta_d), rtol=0, atol=1e-15)
         quarter = {"half-diff": 1.0, "rusinkiewicz": 0.5, "rusinkiewicz-360": 0.25}[chart.name]
         wi, wo = chart.to_directions(np.stack([u, v, np.full_like(u, quarter)], axis=-1))
-        np.testing.assert_allclose(wi[:, 2], wo[:, 2], atol=1e-15)
+        np.testing.assert_allclose(wi[:, 2], wo[:, 2], rtol=0, atol=1e-15)
 
 
 def test_the_ends_of_phi_are_the_side_of_the_light_and_the_mirror_side():
     wi, wo = IN_OUT.to_directions(np.array([[0.5, 0.5, 0.0], [0.5, 0.5, 1.0]]))
-    np.testing.assert_allclose(wi[0], wo[0], atol=1e-15)
-    np.testing.assert_allclose(wi[1], wo[1] * [-1, 1, 1], atol=1e-15)
+    np.testing.assert_allclose(wi[0], wo[0], rtol=0, atol=1e-15)
+    np.testing.assert_allclose(wi[1], wo[1] * [-1, 1, 1], rtol=0, atol=1e-15)
 
 
 @each_fitting
@@ -188,17 +188,24 @@ def test_the_whole_cube_lies_above_the_horizon(chart, rng):
     assert wi[:, 2].min() >= 0
     assert wo[:, 2].min() >= 0
     for w in (wi, wo):
-        np.testing.assert_allclose(np.linalg.norm(w, axis=1), 1.0, atol=1e-15)
+        np.testing.assert_allclose(np.linalg.norm(w, axis=1), 1.0, rtol=0, atol=1e-15)
 
 
 def test_the_face_v_1_of_half_diff_is_the_horizon(rng):
     p = rng.uniform(size=(10_000, 3))
     p[:, 1] = 1.0
     wi, wo = HALF_DIFF.to_directions(p)
-    np.testing.assert_allclose(np.minimum(wi[:, 2], wo[:, 2]), 0.0, atol=1e-15)
+    np.testing.assert_allclose(np.minimum(wi[:, 2], wo[:, 2]), 0.0, rtol=0, atol=1e-15)
     # Next to wi = -wo (u = 0, w = 1) and to u = 1 the half vector has no digits left.
     inside = (p[:, 0] > 0.01) & (p[:, 0] < 0.99) & (p[:, 2] < 0.99)
     np.testing.assert_allclose(HALF_DIFF.to_parameters(wi, wo)[inside, 1], 1.0, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("between", [0.0, 0.5, 2.0, 3.0])
+def test_two_directions_in_the_surface_have_the_angle_between_them_as_parameter(between):
+    """Where h lies in the surface too, theta_d_max is pi/2 and not the quotient of two roundings."""
+    wi, wo = (np.array([[np.cos(a), np.sin(a), 0.0]]) for a in (0.0, between))
+    np.testing.assert_allclose(HALF_DIFF.to_parameters(wi, wo)[0, :2], [1.0, between / np.pi], rtol=0, atol=1e-15)
 
 
 @each
@@ -215,17 +222,12 @@ def test_angles_are_the_angles_of_the_directions(chart, rng):
         np.testing.assert_allclose(degrees[k], np.degrees(expected), rtol=0, atol=1e-8)
 
 
-def test_symmetric_pairs_share_the_half_diff_parameters(rng):
+def test_exchanged_and_mirrored_pairs_have_the_same_half_diff_parameters_to_the_bit(rng):
     wi, wo = random_pairs(rng, 20_000)
     p = HALF_DIFF.to_parameters(wi, wo)
     np.testing.assert_array_equal(HALF_DIFF.to_parameters(wo, wi), p)
     mirror = np.array([1.0, -1.0, 1.0])
     np.testing.assert_array_equal(HALF_DIFF.to_parameters(wi * mirror, wo * mirror), p)
-    angle = rng.uniform(0, 2 * np.pi, len(wi))
-    # phi_d has no more digits than the horizontal parts of h and d leave it.
-    off = (p[:, 0] > 0.05) & (p[:, 1] > 0.01)
-    ours = HALF_DIFF.to_parameters(turned(wi, angle), turned(wo, angle))
-    np.testing.assert_allclose(ours[off], p[off], rtol=0, atol=1e-11)
 
 
 @each
@@ -253,9 +255,9 @@ def test_a_common_rotation_and_the_mirror_image_change_no_parameter(chart, rng):
 def test_normal_incidence_and_retro_reflection_know_no_azimuth(chart, angle):
     """Where the azimuth means nothing it is 0, or a table would show a seam that turns with the surface."""
     w = spherical([0.6], angle)
-    pairs = {"theta_d": [(w, w)], "theta_i": [(N, w), (w, N)]}["theta_i" if chart is IN_OUT else "theta_d"]
-    for wi, wo in pairs:
-        assert chart.to_parameters(wi, wo)[0, 2] == 0.0
+    assert chart.to_parameters(w, w)[0, 2] == 0.0
+    if chart is IN_OUT:
+        assert chart.to_parameters(N, w)[0, 2] == chart.to_parameters(w, N)[0, 2] == 0.0
 
 
 def _cube_integral(chart: Chart, nodes: int, *, above_only: bool = False) -> float:
@@ -343,7 +345,7 @@ def test_grids_are_increasing_nodes_of_the_cube(chart):
 def test_the_grid_of_in_out_is_the_papers():
     assert [len(a) for a in IN_OUT.grid] == [91, 91, 361]
     corners = IN_OUT.angles(np.array([[a[1] for a in IN_OUT.grid], [1, 1, 1]]))
-    np.testing.assert_allclose(corners, [[1.0, 1.0, 0.5], [90, 90, 180]], atol=1e-13)
+    np.testing.assert_allclose(corners, [[1.0, 1.0, 0.5], [90, 90, 180]], rtol=0, atol=1e-13)
 
 
 @each

@@ -99,11 +99,22 @@ def test_bad_parameters_are_refused(make):
 
 @pytest.mark.parametrize(
     "description",
-    [{}, {"name": "sqrt"}, {"name": None}, {"name": ["root"]}, {"name": "root", "eps": 1}, {"name": "linear", "k": 3}],
+    [{}, {"name": "sqrt"}, {"name": None}, {"name": ["root"]}, None, "root", ["root"]],
 )
 def test_bad_descriptions_are_refused(description):
-    with pytest.raises(BvbError):
+    with pytest.raises(BvbError, match=r"Unknown encoding|describes no encoding"):
         encoding_from_dict(description)
+
+
+@pytest.mark.parametrize(("name", "known"), [("root", "k"), ("log", "eps"), ("linear", "none")])
+def test_unknown_parameters_list_the_known_ones(name, known):
+    with pytest.raises(BvbError, match=rf"no parameters \['gain'\]. It has {known}\."):
+        encoding_from_dict({"name": name, "gain": 1})
+
+
+@pytest.mark.parametrize("k", [2, np.int64(2), np.float32(2)])
+def test_parameters_of_any_number_type_become_float(k):
+    assert json.dumps(Root(k).to_dict()) == '{"name": "root", "k": 2.0}'
 
 
 def test_unknown_names_list_the_known_ones():

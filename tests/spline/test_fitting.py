@@ -49,8 +49,8 @@ def _dense_weighted(
     """Solve min |sqrt(W) (A E z - y)| with the columns of E an orthonormal basis of the nets that ``project`` keeps."""
     channels = values.shape[-1]
     kept = np.stack([project(e.reshape(*size, 1)).ravel() for e in np.eye(matrix.shape[1])])
-    np.testing.assert_allclose(kept @ kept, kept, atol=1e-14)
-    np.testing.assert_allclose(kept, kept.T, atol=1e-14)
+    np.testing.assert_allclose(kept @ kept, kept, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(kept, kept.T, rtol=0, atol=1e-14)
     q, singular, _ = np.linalg.svd(kept)
     allowed = q[:, singular > 0.5]
     root = np.sqrt(weights.ravel())[:, None]
@@ -104,7 +104,8 @@ def test_an_axis_offers_its_pseudo_inverse_and_inverse_normal_matrix(rng):
     a = naive.matrix(t, 3, u)
     axis = fit_axis(u, t, 3, w)
     np.testing.assert_allclose(axis.inverse_normal, np.linalg.inv(a.T @ (w[:, None] * a)), rtol=1e-8, atol=1e-10)
-    np.testing.assert_allclose(axis.pseudo_inverse, np.linalg.pinv(np.sqrt(w)[:, None] * a) * np.sqrt(w), atol=1e-10)
+    expected = np.linalg.pinv(np.sqrt(w)[:, None] * a) * np.sqrt(w)
+    np.testing.assert_allclose(axis.pseudo_inverse, expected, rtol=0, atol=1e-10)
 
 
 @pytest.mark.parametrize("size", [88, 89, 90, 91])
@@ -125,6 +126,14 @@ def test_knots_that_ruin_the_solution_are_tamed_and_confessed(size, rng):
     assert errors[0] < errors[1]
 
 
+@pytest.mark.parametrize("size", [88, 91])
+def test_the_penalty_leaves_what_the_data_determine(size):
+    u = np.linspace(0, 1, 91)
+    result = loft(np.sin(6 * u)[:, None], [u], [place_knots("piegl-tiller", u, size, 3)], [3])
+    assert result.notes
+    np.testing.assert_allclose(result.spline.evaluate(u[:, None])[:, 0], np.sin(6 * u), rtol=0, atol=1e-7)
+
+
 def test_knots_that_leave_a_control_point_without_data_are_tamed_too():
     u = np.linspace(0, 1, 20)
     knots = clamped([0.501, 0.502, 0.503, 0.504, 0.505, 0.506], 3)
@@ -132,7 +141,7 @@ def test_knots_that_leave_a_control_point_without_data_are_tamed_too():
     assert result.conditions[0] > CONDITION_LIMIT
     assert result.notes
     x = np.linspace(0, 1, 400)
-    np.testing.assert_allclose(result.spline.evaluate(x[:, None])[:, 0], np.sin(3 * x), atol=0.02)
+    np.testing.assert_allclose(result.spline.evaluate(x[:, None])[:, 0], np.sin(3 * x), rtol=0, atol=0.02)
 
 
 def test_more_control_points_than_data_are_refused(rng):
@@ -171,8 +180,15 @@ def test_data_that_do_not_lie_on_the_grid_are_refused(drop, rng):
 )
 def test_nodes_outside_the_knots_are_refused(nodes):
     """Outside the domain no spline has a value, and what is fitted there by extrapolation means nothing."""
-    with pytest.raises(BvbError):
+    with pytest.raises(BvbError, match="axis 0 lie outside the knots"):
         loft(np.ones((6, 1)), [np.array(nodes)], [clamped([], 3)], [3])
+
+
+@pytest.mark.parametrize("nodes", [np.full(6, 0.5), np.linspace(1, 0, 6), np.array([0, 0.2, 0.2, 0.6, 0.8, 1])])
+def test_nodes_that_do_not_increase_are_refused(nodes):
+    """Coinciding nodes once went through, with coefficients of 2e16."""
+    with pytest.raises(BvbError, match="axis 0 do not increase"):
+        loft(np.ones((6, 1)), [nodes], [clamped([], 3)], [3])
 
 
 @pytest.mark.parametrize("weights", [np.zeros(6), -np.ones(6), np.full(6, np.nan), np.full(6, np.inf), np.ones(5)])
@@ -185,7 +201,7 @@ def test_weights_that_mean_nothing_are_refused(weights):
 @pytest.mark.parametrize("start", [np.zeros((5, 1)), np.zeros((4, 2)), np.zeros(4), np.full((4, 1), np.nan)])
 def test_starts_that_are_no_net_of_this_fit_are_refused(start):
     u = np.linspace(0, 1, 6)
-    with pytest.raises(BvbError):
+    with pytest.raises(BvbError, match="start"):
         fit_weighted(np.ones((6, 1)), np.ones(6), [u], [clamped([], 3)], [3], start=start)
 
 
@@ -223,7 +239,7 @@ def test_the_constrained_fit_is_the_dense_constrained_solution(m, n, degrees, rn
         values, weights, axes, knots, degrees, start=start, project=_project, tolerance=1e-10, max_iterations=2000
     )
     control = result.spline.control
-    np.testing.assert_allclose(_project(control), control, rtol=0, atol=1e-12)
+    assert np.ptp(control[:2], axis=(0, -2)).max() == 0  # to the last bit, whatever rounding the iteration gathered
     used = weights.ravel() > 0
     fitted, wanted = (matrix @ c.reshape(-1, 2) for c in (control, expected))
     np.testing.assert_allclose(fitted[used], wanted[used], rtol=0, atol=1e-6 * np.abs(values).max())
@@ -261,7 +277,6 @@ def test_data_of_weight_zero_have_no_influence(rng):
     used = weights > 0
     fitted = [r.spline.evaluate_grid(axes)[used] for r in (misled, clean)]
     np.testing.assert_allclose(*fitted, rtol=0, atol=1e-4)
-    assert np.abs(garbage).max() == 1e6
 
 
 def test_control_points_without_any_datum_follow_the_start(rng):
@@ -324,21 +339,33 @@ def test_data_of_zeros_are_fitted_by_zeros(start):
         start=np.full((5, 1), start),
         progress=reported.append,
     )
-    np.testing.assert_allclose(result.spline.control, 0.0, atol=1e-9)
+    np.testing.assert_allclose(result.spline.control, 0.0, rtol=0, atol=1e-9)
+    assert all(0 <= p <= 1 for p in reported)
 
 
-@pytest.mark.parametrize(("of_values", "of_weights"), [(-996, 0), (996, 0), (0, -996), (0, 996)])
+@pytest.mark.parametrize(("of_values", "of_weights"), [(-996, 0), (996, 0), (0, -996), (0, 1020)])
 def test_the_weighted_fit_scales_with_data_and_ignores_the_scale_of_weights(of_values, of_weights, rng):
-    """Squares of 1e300 and 1e-300 leave the range of float64: that must not end the iteration at the start."""
+    """Squares of such values leave the range of float64: that must not end the iteration at the start."""
     values, axes, knots, degrees = _problem(rng, (9, 8), (5, 6), (3, 3))
     weights = rng.uniform(0.1, 1.0, (9, 8))
 
-    def solve(values: np.ndarray, weights: np.ndarray) -> Net:
-        start = loft(values, axes, knots, degrees).spline.control
-        return fit_weighted(values, weights, axes, knots, degrees, start=start, tolerance=1e-10).spline.control
+    start = loft(values, axes, knots, degrees).spline.control
 
-    scaled = solve(np.ldexp(values, of_values), np.ldexp(weights, of_weights))
-    np.testing.assert_allclose(np.ldexp(scaled, -of_values), solve(values, weights), rtol=0, atol=1e-7)
+    def solve(of_values: int, of_weights: int) -> Net:
+        y, w, first = np.ldexp(values, of_values), np.ldexp(weights, of_weights), np.ldexp(start, of_values)
+        net = fit_weighted(y, w, axes, knots, degrees, start=first, tolerance=1e-10).spline.control
+        return np.ldexp(net, -of_values)
+
+    np.testing.assert_allclose(solve(of_values, of_weights), solve(0, 0), rtol=0, atol=1e-7)
+
+
+def test_data_at_the_end_of_float64_are_fitted():
+    """Sums of such values leave its range too."""
+    u, largest = np.linspace(0, 1, 9), 0.5 * np.finfo(float).max
+    result = fit_weighted(
+        np.full((9, 1), largest), np.linspace(0.1, 1.0, 9), [u], [clamped([0.5], 3)], [3], start=np.zeros((5, 1))
+    )
+    np.testing.assert_allclose(result.spline.control, largest, rtol=1e-9)
 
 
 def test_progress_rises_to_one(rng):

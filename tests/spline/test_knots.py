@@ -95,6 +95,9 @@ def test_conditions_of_the_collocation_matrix_on_91_uniform_data(placement, size
         (2, [0, 0, 0, 0.9, 1, 1], "not clamped"),
         (2, [0, 0, 1, 1], "at least 6 knots"),
         (0, [1], "at least 2 knots"),
+        (1, [0, 0, 5e-324, 1, 1], "Knots 1 and 2 are"),
+        (1, [0, 0, 1e-200, 1e-200], "Knots 1 and 2 are"),
+        (1, [-1e308, -1e308, 1e308, 1e308], "Knot 0 is -1e.308"),
         (1, [[0, 0], [1, 1]], "in one row"),
     ],
 )
