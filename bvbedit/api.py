@@ -13,6 +13,8 @@ from bvbedit.errors import BvbError
 from bvbedit.io import load, save
 from bvbedit.io.bvb import PRECISIONS, dumps
 from bvbedit.render import render
+from bvbedit.spline.arguments import one_per_axis
+from bvbedit.spline.knots import checked_degree
 
 __all__ = ["Comparison", "compare", "fit", "load", "render", "save"]
 
@@ -59,6 +61,9 @@ def fit(
         raise BvbError(f"Chart {chart!r} is for tables only. Fit in one of {', '.join(FITTING_CHARTS)}.")
     if precision not in PRECISIONS:
         raise BvbError(f"Unknown precision {precision!r}. Choose one of {', '.join(PRECISIONS)}.")
+    degrees = tuple(checked_degree(p) for p in one_per_axis(degrees, "Degrees"))
+    if len(degrees) != 3:
+        raise BvbError(f"{len(degrees)} degrees given. Give three, one for each axis.")
     fitting_chart = chart_named(chart)
 
     def model_of(net: Sequence[int]) -> SplineBrdf:
