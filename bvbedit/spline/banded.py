@@ -5,7 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bvbedit.errors import BvbError
+
 Floats = NDArray[np.float64]
+
+# Of the largest one: below, a pivot of the triangular form is rounding.
+SMALLEST_PIVOT = 1e-13
 
 
 @dataclass(frozen=True)
@@ -32,6 +37,49 @@ class Banded:
         view, shape = _as_three(x, axis)
         out = np.zeros((view.shape[0], self.columns, view.shape[2]))
         kernels.apply_banded_transposed(self.first, self.rows, view, out)
+        return out.reshape((*shape[:axis], self.columns, *shape[axis + 1 :]))
+
+    def after(self, other: "Banded") -> "Banded":
+        """Return the matrix product of this matrix and ``other``: what both do, ``other`` first."""
+        from bvbedit.spline import refinement_kernels
+
+        m = len(self.first)
+        first = np.empty(m, dtype=np.int64)
+        width = refinement_kernels.product_extent(self.first, self.rows, other.first, other.rows, first)
+        first = np.minimum(first, other.columns - width)
+        rows = np.zeros((m, width))
+        refinement_kernels.product_rows(self.first, self.rows, other.first, other.rows, first, rows)
+        return Banded(first, rows, other.columns)
+
+    def between(self, low: int, high: int) -> "Banded":
+        """Return the matrix (m, high - low) of the columns from ``low`` to before ``high``."""
+        k = min(self.rows.shape[1], high - low)
+        first = np.clip(self.first, low, high - k)
+        at = (first - self.first)[:, None] + np.arange(k)
+        inside = (at >= 0) & (at < self.rows.shape[1])
+        rows = np.where(inside, np.take_along_axis(self.rows, np.clip(at, 0, self.rows.shape[1] - 1), axis=1), 0.0)
+        return Banded(first - low, rows, high - low)
+
+    def solve(self, y: Floats, axis: int) -> Floats:
+        """Return the ``x`` (..., columns, ...) for which the matrix times x along ``axis`` is nearest to ``y``.
+
+        Least squares by Givens rotations, for a matrix whose ``first`` does not decrease. Raises BvbError where its
+        columns are linearly dependent as far as float64 can tell.
+        """
+        from bvbedit.spline import refinement_kernels
+
+        m, k = self.rows.shape
+        upper, cosines, sines = np.zeros((self.columns, k)), np.empty((m, k)), np.empty((m, k))
+        refinement_kernels.rotations(self.first, self.rows, upper, cosines, sines)
+        diagonal = np.abs(upper[:, 0])
+        if not diagonal.min() > SMALLEST_PIVOT * diagonal.max():
+            raise BvbError(
+                f"The equations do not determine control point {int(np.argmin(diagonal))} of {self.columns}. "
+                "Keep knots further apart."
+            )
+        view, shape = _as_three(y, axis)
+        out = np.empty((view.shape[0], self.columns, view.shape[2]))
+        refinement_kernels.solve_rotated(self.first, upper, cosines, sines, view, out)
         return out.reshape((*shape[:axis], self.columns, *shape[axis + 1 :]))
 
     def dense(self) -> Floats:

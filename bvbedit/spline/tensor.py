@@ -8,10 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bvbedit.errors import BvbError
-from bvbedit.spline.arguments import is_whole, one_per_axis, real_array, shown
+from bvbedit.spline.arguments import is_real_within, is_whole, one_per_axis, real_array, shown
 from bvbedit.spline.banded import Banded
 from bvbedit.spline.basis import basis_derivatives, collocation, find_spans
 from bvbedit.spline.knots import Floats, checked_knots, greville
+from bvbedit.spline.reduction import checked_reduction, reduced
+from bvbedit.spline.refinement import checked_elevation, containing, divided, elevation, insertion, with_inserted
+from bvbedit.spline.removal import remove_within
 
 MAX_PARAMETERS = 4
 
@@ -135,8 +138,7 @@ class TensorSpline:
 
         Past the degree it is the zero spline of degree 0. Raises BvbError for an unknown axis or a negative order.
         """
-        if not is_whole(axis) or axis not in range(self.parameters):
-            raise BvbError(f"Axis {shown(axis)} does not exist. Choose one of 0 ... {self.parameters - 1}.")
+        axis = self._axis(axis)
         if not is_whole(order) or order < 0:
             raise BvbError(f"Derivative order {shown(order)} is not possible. Choose a whole number >= 0.")
         spline = self
@@ -154,11 +156,210 @@ class TensorSpline:
         slope = p / gap[keep]
         matrix = Banded(keep.astype(np.int64), np.stack([-slope, slope], axis=1), n)
         knots = np.delete(t, np.flatnonzero(gap <= 0) + 1)[1:-1]
-        return TensorSpline(
-            (*self.degrees[:axis], p - 1, *self.degrees[axis + 1 :]),
-            (*self.knots[:axis], knots, *self.knots[axis + 1 :]),
-            matrix.apply(self.control, axis),
+        return self._with_axis(axis, p - 1, knots, matrix.apply(self.control, axis), trusted=False)
+
+    def antiderivative(self, axis: int) -> "TensorSpline":
+        """Return the integral along ``axis`` from its start, a spline of one degree more.
+
+        Raises BvbError for an unknown axis, degree 16, and where sums leave the range of float64.
+        """
+        axis = self._axis(axis)
+        p, t = self.degrees[axis], self.knots[axis]
+        checked_elevation(p, 1, axis)
+        weighted = np.moveaxis(np.moveaxis(self.control, axis, -1) * (_supports(t, p) / (p + 1)), -1, axis)
+        start = np.zeros_like(weighted.take([0], axis))
+        control = np.concatenate([start, np.cumsum(weighted, axis=axis)], axis=axis)
+        return self._with_axis(axis, p + 1, np.concatenate([t[:1], t, t[-1:]]), control, trusted=False)
+
+    def integrate(self, box: Sequence[tuple[float, float]] | None = None) -> Floats:
+        """Return the integral (channels,) over ``box``, d intervals (a, b) with a <= b, or over the whole domain.
+
+        Exact up to rounding. Raises BvbError for a box that is not inside the domain.
+        """
+        values = self.control
+        for (a, b), t, p in zip(self._box(box), self.knots, self.degrees, strict=True):
+            cut = _cut(t, p, a, b)
+            first = int(np.searchsorted(cut, a))
+            n = int(np.searchsorted(cut, b)) - first
+            weights = np.zeros(len(cut) - p - 1)
+            weights[first : first + n] = _supports(cut[first : first + n + p + 1], p) / (p + 1) if a < b else 0.0
+            weights = insertion(t, p, cut).apply_transposed(weights, 0)
+            values = np.tensordot(weights, values, axes=(0, 0))
+        return values
+
+    def insert_knots(self, axis: int, values: ArrayLike) -> "TensorSpline":
+        """Return the same spline with the knots ``values`` (k,), sorted and inside the domain, inserted on ``axis``.
+
+        A value that stands k times gains k copies. Raises BvbError that names axis, index and value for knots outside
+        the domain, unsorted, not finite, or more than degree + 1 times in all. Source: Lyche & Morken (1986).
+
+        >>> bump = TensorSpline((2,), ([0, 0, 0, 1, 1, 1],), [[0.0], [1.0], [0.0]])
+        >>> bump.insert_knots(0, [0.5]).control[:, 0].tolist()
+        [0.0, 0.5, 0.5, 0.0]
+        """
+        axis = self._axis(axis)
+        return self._over(axis, with_inserted(self.knots[axis], self.degrees[axis], values, axis))
+
+    def refine(self, axis: int, factor: int | None = None, *, knots: ArrayLike | None = None) -> "TensorSpline":
+        """Return the same spline with each span of ``axis`` cut into ``factor`` equal parts, or over given ``knots``.
+
+        ``knots`` is a full clamped knot vector that contains the spline's. Raises BvbError where it does not, for a
+        factor below 1, and for spans too narrow to be cut.
+        """
+        axis = self._axis(axis)
+        if (factor is None) == (knots is None):
+            raise BvbError(f"Axis {axis}: refining needs a factor or knots. Give one of them.")
+        t, p = self.knots[axis], self.degrees[axis]
+        fine = divided(t, p, factor, axis) if knots is None else containing(t, p, knots, axis)
+        return self._over(axis, fine)
+
+    def _over(self, axis: int, fine: Floats) -> "TensorSpline":
+        p = self.degrees[axis]
+        return self._with_axis(axis, p, fine, insertion(self.knots[axis], p, fine).apply(self.control, axis))
+
+    def remove_knots(
+        self, axis: int, tolerance: float, *, held: tuple[int, int] | None = None
+    ) -> tuple["TensorSpline", float]:
+        """Return the spline with as many interior knots of ``axis`` removed as ``tolerance`` allows, and the bound.
+
+        The bound, at most ``tolerance``, is certified: no value of any channel changes by more. The knot that costs
+        least goes first. ``held`` control points at the two ends stay, by default one, so that end values do.
+        Raises BvbError for an unknown axis, and for a tolerance below zero or not finite.
+        """
+        return self._without(axis, tolerance, held, None, -1)
+
+    def remove_knot(
+        self, axis: int, value: float, times: int = 1, *, held: tuple[int, int] | None = None
+    ) -> tuple["TensorSpline", float]:
+        """Return the spline without ``times`` copies of the interior knot ``value`` of ``axis``, and the bound.
+
+        Raises BvbError where the knot does not stand there so often, and where ``held`` control points forbid it.
+        """
+        axis = self._axis(axis)
+        t, p = self.knots[axis], self.degrees[axis]
+        count = int(np.sum(t[p + 1 : -p - 1] == value)) if is_real_within(value, t[0], t[-1]) else 0
+        if not is_whole(times) or not 1 <= times <= count:
+            raise BvbError(
+                f"Axis {axis}: knot {shown(value)} stands {count} times inside the domain and cannot be removed "
+                f"{shown(times)} times. Look at the spline's knots."
+            )
+        spline, bound = self._without(axis, np.finfo(np.float64).max, held, float(value), int(times))
+        if len(spline.knots[axis]) > len(t) - times:
+            raise BvbError(f"Axis {axis}: knot {value} cannot go while {held} control points stay. Hold fewer.")
+        return spline, bound
+
+    def _without(
+        self, axis: int, tolerance: float, held: tuple[int, int] | None, at: float | None, most: int
+    ) -> tuple["TensorSpline", float]:
+        axis = self._axis(axis)
+        if not is_real_within(tolerance, 0.0, np.finfo(np.float64).max):
+            raise BvbError(f"Axis {axis}: a tolerance of {shown(tolerance)} allows nothing. Choose a number >= 0.")
+        p, n = self.degrees[axis], self.size[axis]
+        moved = np.moveaxis(self.control, axis, 0)
+        knots, net, bound = remove_within(
+            self.knots[axis], p, np.ascontiguousarray(moved.reshape(n, -1)), tolerance, self._held(axis, held), at, most
         )
+        control = np.moveaxis(net.reshape(len(net), *moved.shape[1:]), 0, axis)
+        return self._with_axis(axis, p, knots, control), bound
+
+    def elevate(self, axis: int, by: int = 1) -> "TensorSpline":
+        """Return the same spline with the degree of ``axis`` raised ``by``; every knot gains as many copies.
+
+        Raises BvbError for an unknown axis and beyond degree 16.
+        """
+        axis = self._axis(axis)
+        p = self.degrees[axis]
+        knots, matrix = elevation(self.knots[axis], p, checked_elevation(p, by, axis))
+        return self._with_axis(axis, p + by, knots, matrix.apply(self.control, axis))
+
+    def reduce(
+        self, axis: int, by: int = 1, tolerance: float | None = None, *, held: tuple[int, int] | None = None
+    ) -> tuple["TensorSpline", float]:
+        """Return the nearest spline with the degree of ``axis`` lowered ``by``, and the certified bound of the change.
+
+        What ``elevate`` added goes without loss. ``held`` control points at the two ends stay, by default one, so that
+        end values do. Raises BvbError for an unknown axis, below degree 0, and where the bound passes ``tolerance``.
+        """
+        axis = self._axis(axis)
+        p = self.degrees[axis]
+        if tolerance is not None and not is_real_within(tolerance, 0.0, np.inf):
+            raise BvbError(f"Axis {axis}: a tolerance of {shown(tolerance)} allows nothing. Choose a number >= 0.")
+        by = checked_reduction(p, by, axis)
+        knots, control, bound = reduced(self.knots[axis], p, self.control, axis, by, self._held(axis, held))
+        if tolerance is not None and bound > tolerance:
+            raise BvbError(
+                f"Axis {axis}: reducing the degree by {by} changes values by up to {bound:.3g}, more than "
+                f"{tolerance:g}. Allow more, or refine first."
+            )
+        return self._with_axis(axis, p - by, knots, control, trusted=False), bound
+
+    def split(self, axis: int, at: float) -> tuple["TensorSpline", "TensorSpline"]:
+        """Return the parts before and after the parameter ``at`` inside the domain of ``axis``, both clamped.
+
+        Raises BvbError for an unknown axis and a parameter that is not strictly inside.
+        """
+        axis = self._axis(axis)
+        a, b = self.domain[axis]
+        if not is_real_within(at, a, b) or not a < at < b:
+            raise BvbError(f"Axis {axis} cannot be split at {shown(at)}. Stay inside ({a}, {b}).")
+        return self._restricted(axis, a, float(at)), self._restricted(axis, float(at), b)
+
+    def restrict(self, box: Sequence[tuple[float, float]]) -> "TensorSpline":
+        """Return the part over ``box``, d intervals (a, b) with a < b inside the domain, clamped.
+
+        Raises BvbError for another box.
+        """
+        spline = self
+        for axis, (a, b) in enumerate(self._box(box)):
+            if not b - a > 0:
+                raise BvbError(f"Axis {axis}: the interval ({a}, {b}) is empty. Give its start and a larger end.")
+            spline = spline._restricted(axis, a, b)
+        return spline
+
+    def _restricted(self, axis: int, a: float, b: float) -> "TensorSpline":
+        t, p = self.knots[axis], self.degrees[axis]
+        cut = _cut(t, p, a, b)
+        first = int(np.searchsorted(cut, a))
+        # Of p + 1 copies at a jump inside, those at the end b belong to the part before it.
+        n = int(np.searchsorted(cut, b)) - first
+        matrix = insertion(t, p, cut)
+        rows = Banded(matrix.first[first : first + n], matrix.rows[first : first + n], matrix.columns)
+        return self._with_axis(axis, p, cut[first : first + n + p + 1], rows.apply(self.control, axis))
+
+    def _axis(self, axis: object) -> int:
+        if not is_whole(axis) or axis not in range(self.parameters):
+            raise BvbError(f"Axis {shown(axis)} does not exist. Choose one of 0 ... {self.parameters - 1}.")
+        return int(axis)
+
+    def _held(self, axis: int, held: object) -> tuple[int, int]:
+        if held is None:
+            # A spline of degree 0 has no end values to speak of: its steps are all alike.
+            return (1, 1) if self.degrees[axis] > 0 else (0, 0)
+        low, high = (*one_per_axis(held, "Held control points"), None, None)[:2]
+        if not is_whole(low) or not is_whole(high) or min(low, high) < 0 or low + high > self.size[axis]:
+            raise BvbError(
+                f"Axis {axis}: {shown(held)} control points cannot be held at the ends of {self.size[axis]}. "
+                "Give two whole numbers."
+            )
+        return int(low), int(high)
+
+    def _box(self, box: object) -> tuple[tuple[float, float], ...]:
+        if box is None:
+            return self.domain
+        intervals = real_array(one_per_axis(box, "Box"), "Box")
+        if intervals.shape != (self.parameters, 2):
+            raise BvbError(f"A box of shape {intervals.shape} is none. Give {self.parameters} intervals (a, b).")
+        for axis, ((a, b), (low, high)) in enumerate(zip(intervals, self.domain, strict=True)):
+            if not low <= a <= b <= high:  # true for nan too
+                raise BvbError(f"Axis {axis}: the interval ({a}, {b}) is not inside [{low}, {high}]. Stay inside.")
+        return tuple((float(a), float(b)) for a, b in intervals)
+
+    def _with_axis(
+        self, axis: int, degree: int, knots: Floats, control: Floats, *, trusted: bool = True
+    ) -> "TensorSpline":
+        degrees = (*self.degrees[:axis], degree, *self.degrees[axis + 1 :])
+        vectors = (*self.knots[:axis], knots, *self.knots[axis + 1 :])
+        return assembled(degrees, vectors, control) if trusted else TensorSpline(degrees, vectors, control)
 
     def _differentiated(self, orders: Sequence[int]) -> "TensorSpline":
         orders = one_per_axis(orders, "Derivative orders")
@@ -204,6 +405,27 @@ class TensorSpline:
     def _polynomials(self) -> tuple[Floats, ...]:
         """The basis functions of each span, (spans, p+1, p+1), in powers of (u - t_s)/(t_{s+1} - t_s)."""
         return tuple(_polynomials(t, p) for t, p in zip(self.knots, self.degrees, strict=True))
+
+
+def assembled(degrees: tuple[int, ...], knots: tuple[Floats, ...], control: Floats) -> TensorSpline:
+    """Return the spline of parts that are known to suit one another and that nobody else holds: nothing is copied."""
+    spline = object.__new__(TensorSpline)
+    control = np.ascontiguousarray(control)
+    for array in (*knots, control):
+        array.setflags(write=False)
+    spline.degrees, spline.knots, spline.control = degrees, knots, control
+    return spline
+
+
+def _supports(t: Floats, p: int) -> Floats:
+    """Return the length (n,) of each basis function's support."""
+    return np.asarray(t[p + 1 :] - t[: -p - 1])
+
+
+def _cut(t: Floats, p: int, a: float, b: float) -> Floats:
+    """Return the knots ``t`` with p + 1 copies of ``a`` and ``b``."""
+    more = [np.repeat(x, p + 1 - np.sum(t == x)) for x in dict.fromkeys((a, b))]
+    return np.sort(np.concatenate([t, *more]))
 
 
 def _polynomials(t: Floats, p: int) -> Floats:

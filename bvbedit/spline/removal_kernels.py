@@ -1,0 +1,152 @@
+"""Compiled loops of knot removal. Inputs are taken to be right, as in ``kernels``.
+
+A net is (n, lines), and ``row_of`` (n,) names the row in which each of its control points is stored, so that taking one
+out moves no others. Knot r is always the last of its copies.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bvbedit.jit import kernel
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+# Products of quotients of knots are kept below this.
+LARGE = 1e150
+
+
+@kernel
+def null_vector(t: Floats, p: int, r: int, alpha: Floats, y: Floats) -> tuple[int, int]:
+    """Return the first index and number of the control points that see knot r, with the vector ``y`` beside them.
+
+    Without knot r a net P would give Q_i = alpha_i P_i + (1 - alpha_i) P_{i-1} (Boehm 1980): one equation more than
+    unknowns. ``y`` is what makes y . Q = 0 for all such Q; ``alpha[i]`` are those factors, 1 for the first, 0 for the
+    last.
+    """
+    z = t[r]
+    low = r
+    while t[low - 1] == z:
+        low -= 1
+    first = r - 1 - p
+    count = low - first + 1
+    alpha[0] = 1.0
+    y[0] = 1.0
+    for i in range(1, count):
+        if i < count - 1:
+            left, right = t[first + i], t[first + i + p + 1]
+            alpha[i] = (z - left) / (right - left)
+            beta = (right - z) / (right - left)
+        else:
+            alpha[i], beta = 0.0, 1.0
+        y[i] = -y[i - 1] * alpha[i - 1] / beta
+        if abs(y[i]) > LARGE:
+            for j in range(i + 1):
+                y[j] /= LARGE
+    return first, count
+
+
+@kernel
+def free_share(y: Floats, first: int, count: int, n: int, held_0: int, held_1: int) -> float:
+    """Return sum |y| over those of the n control points that may change; ``y[count:]`` gets y, 0 for the others."""
+    total = 0.0
+    for i in range(count):
+        y[count + i] = y[i] if held_0 <= first + i < n - held_1 else 0.0
+        total += abs(y[count + i])
+    return total
+
+
+@kernel
+def removal_cost(
+    t: Floats, p: int, r: int, net: Floats, row_of: Indices, n: int, held_0: int, held_1: int, alpha: Floats, y: Floats
+) -> float:
+    """Return the least largest change of a control point with which knot r can go: max |y . Q| / sum |y|.
+
+    The first ``held_0`` and the last ``held_1`` of the n control points may not take part in the change.
+    """
+    first, count = null_vector(t, p, r, alpha, y)
+    share = free_share(y, first, count, n, held_0, held_1)
+    if share == 0.0:
+        return np.inf
+    total = np.zeros(net.shape[1])
+    for i in range(count):
+        factor, row = y[i] / share, net[row_of[first + i]]
+        for a in range(len(total)):
+            total[a] += factor * row[a]
+    return float(np.abs(total).max())
+
+
+@kernel
+def remove_one(
+    t: Floats, p: int, r: int, net: Floats, row_of: Indices, n: int, held_0: int, held_1: int, alpha: Floats, y: Floats
+) -> None:
+    """Take knot r out of ``t`` and one control point out of ``net``, both in place.
+
+    The inconsistent equations are met best in the maximum norm by spreading y . Q with equal size and the signs of y.
+    Then they are solved from both sides to where alpha passes 1/2, so that no step enlarges an error.
+    """
+    first, count = null_vector(t, p, r, alpha, y)
+    share = free_share(y, first, count, n, held_0, held_1)
+    # Left of the middle an equation yields its own control point, right of it the one before.
+    middle = 0
+    while middle + 1 < count - 1 and alpha[middle + 1] >= 0.5:
+        middle += 1
+    rows = row_of[first : first + count].copy()
+    total = np.zeros(net.shape[1])
+    for i in range(count):
+        total += (y[i] / share) * net[rows[i]]
+    for i in range(count):
+        if y[count + i] != 0.0:
+            net[rows[i]] -= np.sign(y[i]) * total
+    for i in range(1, middle + 1):
+        net[rows[i]] = (net[rows[i]] - (1.0 - alpha[i]) * net[rows[i - 1]]) / alpha[i]
+    # From the right, control point i - 1 comes from equation i: until the end it is stored one row later.
+    for i in range(count - 2, middle + 1, -1):
+        net[rows[i]] = (net[rows[i]] - alpha[i] * net[rows[i + 1]]) / (1.0 - alpha[i])
+    # What stands in row middle + 1 was the equation left over.
+    for i in range(first + middle + 1, n - 1):
+        row_of[i] = row_of[i + 1]
+    for i in range(r, len(t) - 1):
+        t[i] = t[i + 1]
+
+
+@kernel
+def remove_cheapest(
+    t: Floats,
+    p: int,
+    net: Floats,
+    row_of: Indices,
+    n: int,
+    held_0: int,
+    held_1: int,
+    costs: Floats,
+    may_go: NDArray[np.bool_],
+    budget: float,
+    most: int,
+) -> tuple[int, float]:
+    """Remove the knot that costs least, again and again, while the costs sum up to ``budget`` at most.
+
+    ``costs`` (knots,) hold the cost of each knot, nan where it is to be computed; ``may_go`` (knots,) tells which of
+    them may be removed. Returns the number of removed knots, ``most`` at most, and the sum of their costs.
+    """
+    alpha, y = np.empty(p + 2), np.empty(2 * (p + 2))
+    removed, spent = 0, 0.0
+    while True:
+        best, r = np.inf, -1
+        for k in range(p + 1, n):
+            if np.isnan(costs[k]):
+                costs[k] = np.inf
+                if may_go[k] and t[k + 1] > t[k]:
+                    costs[k] = removal_cost(t, p, k, net, row_of, n, held_0, held_1, alpha, y)
+            if costs[k] < best:
+                best, r = costs[k], k
+        if r < 0 or spent + best > budget or removed == most:
+            return removed, spent
+        remove_one(t[: n + p + 1], p, r, net, row_of, n, held_0, held_1, alpha, y)
+        spent += best
+        removed += 1
+        n -= 1
+        for k in range(r, n + p + 1):
+            costs[k], may_go[k] = costs[k + 1], may_go[k + 1]
+        for k in range(max(p + 1, r - p - 1), min(n, r + p + 2)):
+            costs[k] = np.nan
