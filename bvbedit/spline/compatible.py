@@ -10,7 +10,7 @@ from bvbedit.errors import BvbError
 from bvbedit.spline.arguments import is_real_within, one_per_axis, real_array, shown
 from bvbedit.spline.knots import Floats
 from bvbedit.spline.refinement import elevation, insertion
-from bvbedit.spline.tensor import TensorSpline, assembled
+from bvbedit.spline.tensor import TensorSpline, all_finite, assembled
 
 # Of the domain's largest parameter: knots closer than this are taken for one, computed in two ways.
 KNOT_TOLERANCE = 2.0**-46
@@ -95,12 +95,20 @@ def _moved(axis: int, vectors: Sequence[Floats], tolerance: float, merged: list[
                 "Reparametrise or restrict one."
             )
         values = np.unique(t)
-        there, back = _nearest(values, known), _nearest(known, values)
-        own = np.arange(len(values))
-        # Mutually nearest pairs keep the order of the knots.
-        pairs = (back[there] == own) & (np.abs(known[there] - values) <= near)
-        placed = np.where(pairs, known[there], values)
+        placed = values.copy()
         placed[[0, -1]] = ends
+        inside = values[1:-1]
+        if len(inside) and len(known) > 2:
+            there, back = _nearest(inside, known[1:-1]), _nearest(known[1:-1], inside)
+            # Mutually nearest pairs keep the order of the knots.
+            pairs = (back[there] == np.arange(len(inside))) & (np.abs(known[1:-1][there] - inside) <= near)
+            placed[1:-1] = np.where(pairs, known[1:-1][there], inside)
+        if not (np.diff(placed) > 0).all():
+            i = int(np.flatnonzero(np.diff(placed) <= 0)[0])
+            i = i if i > 0 else 1
+            raise BvbError(
+                f"Axis {axis}: knot {values[i]} of spline {k} is an end of the first, up to rounding. Remove that knot."
+            )
         merged += [
             MergedKnot(k, axis, float(new), float(old)) for new, old in zip(placed, values, strict=True) if new != old
         ]
@@ -120,8 +128,8 @@ def _nearest(x: Floats, among: Floats) -> np.ndarray[tuple[int], np.dtype[np.int
 def combine(splines: Sequence[TensorSpline], weights: Sequence[ArrayLike]) -> TensorSpline:
     """Return sum_k weights[k] splines[k] over common knots; each weight is a number or one per channel.
 
-    Raises BvbError for another number of weights, weights that are not finite, and splines of unequal channels or
-    domains.
+    Knots equal up to rounding are united, as ``make_compatible`` does and reports. Raises BvbError for another number
+    of weights, weights that are not finite, and splines of unequal channels or domains.
     """
     splines, weights = one_per_axis(splines, "Splines"), one_per_axis(weights, "Weights")
     if len(splines) != len(weights) or not splines:
@@ -136,7 +144,7 @@ def combine(splines: Sequence[TensorSpline], weights: Sequence[ArrayLike]) -> Te
         net = same[0].control * factors[0]
         for s, w in zip(same[1:], factors[1:], strict=True):
             net += s.control * w
-    if not np.isfinite(net).all():
+    if not all_finite(net):
         raise BvbError("The combination leaves the range of float64. Choose smaller weights.")
     return assembled(same[0].degrees, same[0].knots, net)
 

@@ -48,7 +48,9 @@ def distance(a: TensorSpline, b: TensorSpline) -> Distance:
     if a.channels != b.channels:
         raise BvbError(f"{a.channels} and {b.channels} channels cannot be compared. Give equal numbers.")
     (a, b), _ = make_compatible(a, b)
-    difference = a.with_control(a.control - b.control)
+    with np.errstate(over="ignore"):
+        net = a.control - b.control
+    difference = a.with_control(net)
     axes = []
     for t in difference.knots:
         values = np.unique(t)

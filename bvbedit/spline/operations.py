@@ -11,7 +11,7 @@ from bvbedit.spline.banded import Banded
 from bvbedit.spline.basis import interpolation, limits
 from bvbedit.spline.compatible import unite_knots
 from bvbedit.spline.knots import MAX_DEGREE, Floats
-from bvbedit.spline.tensor import TensorSpline, assembled
+from bvbedit.spline.tensor import TensorSpline, all_finite, assembled
 
 # Of the largest control point: what joining two halves of one spline leaves as rounding.
 JOIN_TOLERANCE = 2.0**-44
@@ -140,7 +140,10 @@ def product(a: TensorSpline, b: TensorSpline) -> TensorSpline:
         values_b = limits(b.knots[axis], b.degrees[axis], x, before).apply(values_b, axis)
         knots.insert(0, t)
         matrices.insert(0, matrix)
-    values = values_a * values_b
+    with np.errstate(over="ignore", invalid="ignore"):
+        values = values_a * values_b
+    if not all_finite(values):
+        raise BvbError("The product leaves the range of float64. Scale a factor.")
     for axis, matrix in enumerate(matrices):
         values = matrix.solve(values, axis)
     return TensorSpline(degrees, knots, values)

@@ -72,7 +72,7 @@ def with_inserted(t: Floats, p: int, values: ArrayLike, axis: int) -> Floats:
             f"Axis {axis}: knot {i} to insert is {new[k]}, which would stand {copies[k]} times. "
             f"Degree {p} allows {p + 1}."
         )
-    return _checked(np.sort(np.concatenate([t, x])), p, axis)
+    return checked_knots_of(axis, np.sort(np.concatenate([t, x])), p)
 
 
 def containing(t: Floats, p: int, target: ArrayLike, axis: int) -> Floats:
@@ -80,7 +80,7 @@ def containing(t: Floats, p: int, target: ArrayLike, axis: int) -> Floats:
 
     Raises BvbError that names axis, index and value otherwise.
     """
-    fine = _checked(target, p, axis)
+    fine = checked_knots_of(axis, target, p)
     values, count = np.unique(t, return_counts=True)
     copies = np.searchsorted(fine, values, side="right") - np.searchsorted(fine, values, side="left")
     if (copies < count).any():
@@ -109,7 +109,7 @@ def divided(t: Floats, p: int, factor: object, axis: int) -> Floats:
     fine = np.sort(np.concatenate([t, inside]))
     if len(np.unique(inside)) < len(inside) or np.isin(inside, values).any():
         raise BvbError(f"Axis {axis}: its narrowest span has no {shown(factor)} parts in float64. Insert knots singly.")
-    return _checked(fine, p, axis)
+    return checked_knots_of(axis, fine, p)
 
 
 # Knots of one axis after a division.
@@ -125,7 +125,8 @@ def checked_elevation(p: int, by: object, axis: int) -> int:
     return int(by)
 
 
-def _checked(t: ArrayLike, p: int, axis: int) -> Floats:
+def checked_knots_of(axis: int, t: ArrayLike, p: int) -> Floats:
+    """Return ``checked_knots``. Raises BvbError that names the axis too."""
     try:
         return checked_knots(t, p)
     except BvbError as error:

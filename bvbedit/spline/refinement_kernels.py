@@ -10,22 +10,28 @@ Indices = NDArray[np.int64]
 
 
 @kernel
-def blossom_weights(t: Floats, p: int, args: Floats, before: float, weights: Floats, new: Floats) -> int:
+def blossom_weights(t: Floats, p: int, args: Floats, before: float, near: int, weights: Floats, new: Floats) -> int:
     """Write into ``weights`` what each control point counts in the blossom f(args), and return the first's index.
 
     ``args`` (p,) stand side by side in a knot vector that contains ``t`` (or do so with one of them left out), behind
     the knot ``before``. Those that are knots of ``t`` are arguments which the control points share; each of the others
     replaces one outer knot, by an affine combination that is convex since ``args`` lie between the outer knots (Lyche &
     Morken 1986). So all weights are >= 0 and each is right to a few ulps of itself, whatever the knots.
-    ``new`` is room for p numbers.
+    The search for args[0] in ``t`` begins at the index ``near``; ``new`` is room for p numbers.
     """
     weights[:] = 0.0
     if p == 0:
         weights[0] = 1.0
-        return int(np.searchsorted(t, before, side="right")) - 1
+        return near
     z = args[0]
-    start = int(np.searchsorted(t, z, side="left"))
-    in_knots = int(np.searchsorted(t, z, side="right")) - start
+    start = near
+    while start > 0 and t[start - 1] >= z:
+        start -= 1
+    while t[start] < z:
+        start += 1
+    in_knots = 0
+    while start + in_knots < len(t) and t[start + in_knots] == z:
+        in_knots += 1
     in_args = 0
     while in_args < p and args[in_args] == z:
         in_args += 1
@@ -63,15 +69,18 @@ def blossom_rows(t: Floats, p: int, fine: Floats, q: int, first: Indices, rows: 
     """
     weights, new, args = np.empty(p + 1), np.empty(p + 1), np.empty(p)
     blossoms = 1 if q == p else q
+    span = 0
     for i in range(len(first)):
-        base = int(np.searchsorted(t, fine[i], side="right")) - 1 - p
+        while t[span + 1] <= fine[i]:
+            span += 1
+        base = span - p
         first[i] = base
         rows[i] = 0.0
         for omitted in range(blossoms):
             args[:] = fine[i + 1 : i + 1 + p]
             if q > p:
                 args[omitted:] = fine[i + 2 + omitted : i + 1 + q]
-            at = blossom_weights(t, p, args, fine[i], weights, new)
+            at = blossom_weights(t, p, args, fine[i], span, weights, new)
             for k in range(max(0, base - at), min(p, base + p - at) + 1):
                 rows[i, at + k - base] += weights[k]
         if blossoms > 1:

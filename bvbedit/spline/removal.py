@@ -49,6 +49,8 @@ def remove_within(
 
 def change(t: Floats, p: int, net: Floats, coarse: Floats, rows: Floats) -> float:
     """Return the largest control point, over the knots ``t``, of the difference of ``net`` and ``rows``."""
-    if len(rows) == len(net):
-        return float(np.abs(rows - net).max())
-    return float(np.abs(insertion(coarse, p, t).apply(rows, 0) - net).max())
+    there = rows if len(rows) == len(net) else insertion(coarse, p, t).apply(rows, 0)
+    with np.errstate(over="ignore", invalid="ignore"):
+        largest = float(np.abs(there - net).max())
+    # What overflows is no bound, and no tolerance allows it.
+    return largest if np.isfinite(largest) else np.inf

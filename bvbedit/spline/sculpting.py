@@ -47,7 +47,11 @@ def move_points(
     if not np.isfinite(wanted).all():
         i = int(np.argwhere(~np.isfinite(wanted))[0][0])
         raise BvbError(f"Target {i} is {shown(wanted[i].tolist())}. Targets must be finite.")
-    change = wanted - spline.evaluate(x)
+    with np.errstate(over="ignore", invalid="ignore"):
+        change = wanted - spline.evaluate(x)
+    if not np.isfinite(change).all():
+        i = int(np.argwhere(~np.isfinite(change))[0][0])
+        raise BvbError(f"The way to target {i} leaves the range of float64. Choose smaller targets.")
     if keep is not None:
         still = real_array(keep, "Points to keep").reshape(-1, d) if np.size(keep) else np.empty((0, d))
         spline.evaluate(still)
@@ -73,7 +77,8 @@ def move_points(
         what = f"target {i}" if i < len(wanted) else f"point {i - len(wanted)} to keep"
         raise BvbError(f"The spline cannot meet {what} beside the others: it misses it by {missed[i]:.3g}. Refine it.")
     net = spline.control.reshape(-1, spline.channels).copy()
-    net[seen] += delta
+    with np.errstate(over="ignore"):
+        net[seen] += delta
     return spline.with_control(net.reshape(spline.control.shape))
 
 
@@ -103,4 +108,6 @@ def scale_region(
         weight = np.multiply.outer(weight, share * share * (3 - 2 * share))
     if not weight.any():
         raise BvbError(f"No control point stands in the box {shown(intervals)}. Widen it, or refine the spline.")
-    return spline.with_control(spline.control * (1 + (factor - 1) * weight[..., None]))
+    with np.errstate(over="ignore"):
+        net = spline.control * (1 + (factor - 1) * weight[..., None])
+    return spline.with_control(net)

@@ -11,9 +11,17 @@ from bvbedit.errors import BvbError
 from bvbedit.spline.arguments import is_real_within, is_whole, one_per_axis, real_array, shown
 from bvbedit.spline.banded import Banded
 from bvbedit.spline.basis import basis_derivatives, collocation, find_spans
-from bvbedit.spline.knots import Floats, checked_knots, greville
+from bvbedit.spline.knots import Floats, greville
 from bvbedit.spline.reduction import checked_reduction, reduced
-from bvbedit.spline.refinement import checked_elevation, containing, divided, elevation, insertion, with_inserted
+from bvbedit.spline.refinement import (
+    checked_elevation,
+    checked_knots_of,
+    containing,
+    divided,
+    elevation,
+    insertion,
+    with_inserted,
+)
 from bvbedit.spline.removal import remove_within
 
 MAX_PARAMETERS = 4
@@ -40,13 +48,15 @@ class TensorSpline:
                 f"{len(degrees)} degrees and {len(knots)} knot vectors are no spline. "
                 f"Give one of each for 1 ... {MAX_PARAMETERS} parameters."
             )
-        self.knots: tuple[Floats, ...] = tuple(checked_knots(t, p) for t, p in zip(knots, degrees, strict=True))
+        self.knots: tuple[Floats, ...] = tuple(
+            checked_knots_of(axis, t, p) for axis, (t, p) in enumerate(zip(knots, degrees, strict=True))
+        )
         self.degrees: tuple[int, ...] = tuple(int(p) for p in degrees)
         net = np.array(real_array(control, "Control points"), order="C")
         size = tuple(len(t) - p - 1 for t, p in zip(self.knots, self.degrees, strict=True))
         if net.ndim != len(size) + 1 or net.shape[:-1] != size or net.shape[-1] == 0:
             raise BvbError(f"Control points have shape {net.shape}. Knots and degrees ask for {size} and channels.")
-        if not np.isfinite(net).all():
+        if not all_finite(net):
             where = tuple(int(i) for i in np.argwhere(~np.isfinite(net))[0])
             raise BvbError(f"Control point {where} is {net[where]}. Control points must be finite.")
         net.setflags(write=False)
@@ -166,15 +176,17 @@ class TensorSpline:
         axis = self._axis(axis)
         p, t = self.degrees[axis], self.knots[axis]
         checked_elevation(p, 1, axis)
-        weighted = np.moveaxis(np.moveaxis(self.control, axis, -1) * (_supports(t, p) / (p + 1)), -1, axis)
-        start = np.zeros_like(weighted.take([0], axis))
-        control = np.concatenate([start, np.cumsum(weighted, axis=axis)], axis=axis)
+        with np.errstate(over="ignore", invalid="ignore"):
+            weighted = np.moveaxis(np.moveaxis(self.control, axis, -1) * (_supports(t, p) / (p + 1)), -1, axis)
+            start = np.zeros_like(weighted.take([0], axis))
+            control = np.concatenate([start, np.cumsum(weighted, axis=axis)], axis=axis)
         return self._with_axis(axis, p + 1, np.concatenate([t[:1], t, t[-1:]]), control, trusted=False)
 
     def integrate(self, box: Sequence[tuple[float, float]] | None = None) -> Floats:
         """Return the integral (channels,) over ``box``, d intervals (a, b) with a <= b, or over the whole domain.
 
-        Exact up to rounding. Raises BvbError for a box that is not inside the domain.
+        Exact up to rounding. Raises BvbError for a box that is not inside the domain, and where sums leave the range
+        of float64.
         """
         values = self.control
         for (a, b), t, p in zip(self._box(box), self.knots, self.degrees, strict=True):
@@ -184,7 +196,10 @@ class TensorSpline:
             weights = np.zeros(len(cut) - p - 1)
             weights[first : first + n] = _supports(cut[first : first + n + p + 1], p) / (p + 1) if a < b else 0.0
             weights = insertion(t, p, cut).apply_transposed(weights, 0)
-            values = np.tensordot(weights, values, axes=(0, 0))
+            with np.errstate(over="ignore", invalid="ignore"):
+                values = np.tensordot(weights, values, axes=(0, 0))
+        if not np.isfinite(values).all():
+            raise BvbError("The integral leaves the range of float64. Scale the spline, or shorten its domain.")
         return values
 
     def insert_knots(self, axis: int, values: ArrayLike) -> "TensorSpline":
@@ -285,7 +300,10 @@ class TensorSpline:
         if tolerance is not None and not is_real_within(tolerance, 0.0, np.inf):
             raise BvbError(f"Axis {axis}: a tolerance of {shown(tolerance)} allows nothing. Choose a number >= 0.")
         by = checked_reduction(p, by, axis)
-        knots, control, bound = reduced(self.knots[axis], p, self.control, axis, by, self._held(axis, held))
+        with np.errstate(over="ignore", invalid="ignore"):
+            knots, control, bound = reduced(self.knots[axis], p, self.control, axis, by, self._held(axis, held))
+        if not np.isfinite(bound):
+            raise BvbError(f"Axis {axis}: reducing the degree leaves the range of float64. Scale the spline.")
         if tolerance is not None and bound > tolerance:
             raise BvbError(
                 f"Axis {axis}: reducing the degree by {by} changes values by up to {bound:.3g}, more than "
@@ -359,6 +377,9 @@ class TensorSpline:
     ) -> "TensorSpline":
         degrees = (*self.degrees[:axis], degree, *self.degrees[axis + 1 :])
         vectors = (*self.knots[:axis], knots, *self.knots[axis + 1 :])
+        # Even convex combinations may, by rounding at its very end.
+        if not all_finite(control):
+            raise BvbError(f"Axis {axis}: control points would leave the range of float64. Scale the spline.")
         return assembled(degrees, vectors, control) if trusted else TensorSpline(degrees, vectors, control)
 
     def _differentiated(self, orders: Sequence[int]) -> "TensorSpline":
@@ -417,6 +438,11 @@ def assembled(degrees: tuple[int, ...], knots: tuple[Floats, ...], control: Floa
     return spline
 
 
+def all_finite(net: Floats) -> bool:
+    """Return whether no number of ``net`` is nan or infinite, without an array of answers."""
+    return bool(np.isfinite(net.min()) and np.isfinite(net.max()))
+
+
 def _supports(t: Floats, p: int) -> Floats:
     """Return the length (n,) of each basis function's support."""
     return np.asarray(t[p + 1 :] - t[: -p - 1])
@@ -440,5 +466,5 @@ def _polynomials(t: Floats, p: int) -> Floats:
 
 def _check_inside(x: Floats, a: float, b: float, axis: int) -> None:
     if len(x) and not (x.min() >= a and x.max() <= b):  # false for nan too
-        bad = x[~((x >= a) & (x <= b))][0]
-        raise BvbError(f"Parameter {bad} of axis {axis} is outside the domain [{a}, {b}]. Stay inside.")
+        i = int(np.flatnonzero(~((x >= a) & (x <= b)))[0])
+        raise BvbError(f"Parameter {i} = {x[i]} of axis {axis} is outside the domain [{a}, {b}]. Stay inside.")
