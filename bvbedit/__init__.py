@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 from bvbedit.errors import BvbError
 
 if TYPE_CHECKING:
-    from bvbedit.api import Comparison, compare, fit, load, render, save
+    from bvbedit.api import Comparison, blend, compare, fit, load, render, save
     from bvbedit.brdf.spline_brdf import SplineBrdf
     from bvbedit.spline.tensor import TensorSpline
 
 __version__ = "0.1.0"
 
-__all__ = ["BvbError", "Comparison", "SplineBrdf", "TensorSpline", "compare", "fit", "load", "render", "save"]
+__all__ = ["BvbError", "Comparison", "SplineBrdf", "TensorSpline", "blend", "compare", "fit", "load", "render", "save"]
 
 _HOMES = {"SplineBrdf": "bvbedit.brdf.spline_brdf", "TensorSpline": "bvbedit.spline.tensor"}
 

@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from bvbedit.brdf.base import Brdf
+from bvbedit.brdf.blend import blend
 from bvbedit.brdf.charts import FITTING_CHARTS, Chart, chart_named
 from bvbedit.brdf.encodings import encoding_named
 from bvbedit.brdf.fit import fit_net
@@ -16,7 +17,7 @@ from bvbedit.render import render
 from bvbedit.spline.arguments import one_per_axis
 from bvbedit.spline.knots import checked_degree
 
-__all__ = ["Comparison", "compare", "fit", "load", "render", "save"]
+__all__ = ["Comparison", "blend", "compare", "fit", "load", "render", "save"]
 
 DEFAULT_MAX_BYTES = 48 * 1024
 # Every fifth node of each axis: 0.1 s in place of several, and enough to tell a good fit from a bad one.
@@ -71,7 +72,7 @@ def fit(
             brdf, fitting_chart, encoding_named(encoding), size=net, degrees=degrees, knots=knots, progress=progress
         )
         metrics: dict[str, Any] = {"stride": REPORT_STRIDE, **compare(model, brdf, stride=REPORT_STRIDE).to_dict()}
-        return SplineBrdf(model.spline, model.chart, model.encoding, {**model.report, "metrics": metrics})
+        return model.told(metrics=metrics)
 
     if size is not None:
         return model_of(size)

@@ -16,7 +16,7 @@ from bvbedit.brdf.measured import MeasuredBrdf, hold
 from bvbedit.brdf.spline_brdf import SplineBrdf, check_fitting_chart, keep_faces
 from bvbedit.errors import BvbError
 from bvbedit.spline.arguments import one_per_axis, shown
-from bvbedit.spline.fitting import fit_weighted, loft
+from bvbedit.spline.fitting import FitResult, fit_weighted, loft
 from bvbedit.spline.knots import place_knots
 
 # The horizon itself, where reflectance need not exist, is looked at from this far above (radians).
@@ -62,34 +62,69 @@ def fit_net(
     configuration alone (``in-out``, ``linear``, ``piegl-tiller``) is lofted to the filled table with equal weights and
     free faces (Lee & Park 2008). Raises BvbError where size and degrees do not suit each other or the data.
     """
-    start = perf_counter()
     check_fitting_chart(chart)
     size, degrees = one_per_axis(size, "Size"), one_per_axis(degrees, "Degrees")
     if len(size) != 3 or len(degrees) != 3:
         raise BvbError(
             f"Size {shown(size)} and degrees {shown(degrees)} are not three numbers each. Give one for each axis."
         )
+    start = perf_counter()
     published = chart is IN_OUT and isinstance(encoding, Linear) and knots == "piegl-tiller"
     samples = sample(brdf, chart, encoding, partners=not published)
     vectors = [place_knots(knots, u, n, p) for u, n, p in zip(samples.axes, size, degrees, strict=True)]
     if published:
-        result = loft(samples.values, samples.axes, vectors, degrees)
+        model = _reported(loft(samples.values, samples.axes, vectors, degrees), samples, chart, encoding, "lofting")
     else:
-        values = hold(samples.values, samples.weights > 0, chart.hold_order)
-        first = loft(values, samples.axes, vectors, degrees)
-        result = fit_weighted(
-            values,
-            np.where(samples.weights > 0, samples.weights, HELD_WEIGHT),
-            samples.axes,
-            vectors,
-            degrees,
-            start=first.spline.control,
-            project=lambda control: keep_faces(control, chart),
-            progress=progress,
-        )
+        model = _constrained(samples, chart, encoding, vectors, degrees, progress)
+    return model.told(knots=knots, seconds=perf_counter() - start)
+
+
+def fit_over(
+    brdf: Brdf,
+    chart: Chart,
+    encoding: Encoding,
+    knots: Sequence[Floats],
+    degrees: Sequence[int],
+    *,
+    progress: Progress | None = None,
+) -> SplineBrdf:
+    """Return the B-spline volume over given full knot vectors that approximates ``brdf``, as ``fit_net`` does.
+
+    Raises BvbError where the knots or degrees are none, or ask for more control points than the grid has nodes.
+    """
+    check_fitting_chart(chart)
+    start = perf_counter()
+    model = _constrained(sample(brdf, chart, encoding), chart, encoding, knots, degrees, progress)
+    return model.told(knots="given", seconds=perf_counter() - start)
+
+
+def _constrained(
+    samples: Samples,
+    chart: Chart,
+    encoding: Encoding,
+    knots: Sequence[Floats],
+    degrees: Sequence[int],
+    progress: Progress | None,
+) -> SplineBrdf:
+    """Fit with weights and with equal control points on degenerate faces."""
+    values = hold(samples.values, samples.weights > 0, chart.hold_order)
+    first = loft(values, samples.axes, knots, degrees)
+    result = fit_weighted(
+        values,
+        np.where(samples.weights > 0, samples.weights, HELD_WEIGHT),
+        samples.axes,
+        knots,
+        degrees,
+        start=first.spline.control,
+        project=lambda control: keep_faces(control, chart),
+        progress=progress,
+    )
+    return _reported(result, samples, chart, encoding, "weighted")
+
+
+def _reported(result: FitResult, samples: Samples, chart: Chart, encoding: Encoding, solver: str) -> SplineBrdf:
     report: dict[str, Any] = {
-        "knots": knots,
-        "solver": "lofting" if published else "weighted",
+        "solver": solver,
         "grid": [len(u) for u in samples.axes],
         "without_data": float(np.mean(samples.weights == 0)),
         "clamped": samples.clamped,
@@ -97,7 +132,6 @@ def fit_net(
         "iterations": result.iterations,
         "residual": result.residual,
         "notes": list(result.notes),
-        "seconds": perf_counter() - start,
     }
     return SplineBrdf(result.spline, chart, encoding, report)
 

@@ -47,6 +47,10 @@ class SplineBrdf(Brdf):
         """Return the model with the same chart and encoding and an edited ``spline``."""
         return SplineBrdf(spline, self.chart, self.encoding)
 
+    def told(self, **more: Any) -> "SplineBrdf":
+        """Return the same model with ``more`` in its report."""
+        return SplineBrdf(self.spline, self.chart, self.encoding, {**self.report, **more})
+
     def _evaluate(self, wi: Floats, wo: Floats) -> tuple[Floats, Bools]:
         f = self.encoding.decode(self.spline.evaluate(self.chart.to_parameters(wi, wo)))
         return f, np.ones(len(f), dtype=bool)

@@ -64,7 +64,6 @@ def fit(
     from time import perf_counter
 
     from bvbedit import api
-    from bvbedit.brdf.spline_brdf import SplineBrdf
     from bvbedit.io import check_target
 
     start = perf_counter()
@@ -83,7 +82,7 @@ def fit(
             precision=precision,
             progress=watch,
         )
-    model = SplineBrdf(model.spline, model.chart, model.encoding, {"source": source.name, **model.report})
+    model = model.told(source=source.name)
     api.save(model, target, precision=precision)
     result = describe_model(model, target)
     report({**result, "seconds": perf_counter() - start}, as_json)
