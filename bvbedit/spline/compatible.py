@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from bvbedit.errors import BvbError
 from bvbedit.spline.arguments import is_real_within, one_per_axis, real_array, shown
 from bvbedit.spline.knots import Floats
-from bvbedit.spline.refinement import elevation, insertion
+from bvbedit.spline.refinement import checked_knots_of, elevation, insertion
 from bvbedit.spline.tensor import TensorSpline, all_finite, assembled
 
 # Of the domain's largest parameter: knots closer than this are taken for one, computed in two ways.
@@ -66,7 +66,7 @@ def unite_knots(
         raised = [elevation(t, s.degrees[axis], target - s.degrees[axis]) for s, t in zip(out, vectors, strict=True)]
         values = np.unique(np.concatenate([t for t, _ in raised]))
         counts = np.max([np.searchsorted(t, values, "right") - np.searchsorted(t, values) for t, _ in raised], axis=0)
-        union = np.repeat(values, counts)
+        union = checked_knots_of(axis, np.repeat(values, counts), target)
         for k, (t, matrix) in enumerate(raised):
             if len(t) < len(union):
                 matrix = insertion(t, target, union).after(matrix)
@@ -138,7 +138,7 @@ def combine(splines: Sequence[TensorSpline], weights: Sequence[ArrayLike]) -> Te
     for k, s in enumerate(splines):
         if s.channels != channels:
             raise BvbError(f"Spline {k} has {s.channels} channels, the first {channels}. They must agree.")
-    factors = [_factor(w, channels, f"Weight {k}") for k, w in enumerate(weights)]
+    factors = [checked_factor(w, channels, f"Weight {k}") for k, w in enumerate(weights)]
     same, _ = make_compatible(*splines)
     with np.errstate(over="ignore", invalid="ignore"):
         net = same[0].control * factors[0]
@@ -165,11 +165,12 @@ def blend(a: TensorSpline, b: TensorSpline, t: "ArrayLike | TensorSpline") -> Te
         from bvbedit.spline.operations import product
 
         return combine([a, product(t, combine([b, a], [1.0, -1.0]))], [1.0, 1.0])
-    share = _factor(t, a.channels, "t")
+    share = checked_factor(t, a.channels, "t")
     return combine([a, b], [1.0 - share, share])
 
 
-def _factor(value: ArrayLike, channels: int, name: str) -> Floats:
+def checked_factor(value: ArrayLike, channels: int, name: str) -> Floats:
+    """Return ``value`` as an array () or (channels,). Raises BvbError for another shape and what is not finite."""
     factor = real_array(value, name)
     if factor.shape not in ((), (1,), (channels,)) or not np.isfinite(factor).all():
         raise BvbError(f"{name} is {shown(value)}. Give one finite number, or {channels}, one for each channel.")

@@ -11,6 +11,7 @@ from bvbedit.spline.banded import Banded
 from bvbedit.spline.basis import interpolation, limits
 from bvbedit.spline.compatible import unite_knots
 from bvbedit.spline.knots import MAX_DEGREE, Floats
+from bvbedit.spline.refinement import checked_knots_of
 from bvbedit.spline.tensor import TensorSpline, all_finite, assembled
 
 # Of the largest control point: what joining two halves of one spline leaves as rounding.
@@ -130,6 +131,7 @@ def product(a: TensorSpline, b: TensorSpline) -> TensorSpline:
         if degrees[axis] > MAX_DEGREE:
             raise BvbError(f"Axis {axis}: a product of degree {degrees[axis]} is beyond {MAX_DEGREE}. Reduce a factor.")
         t = _product_knots(a.knots[axis], a.degrees[axis], b.knots[axis], b.degrees[axis])
+        t = checked_knots_of(axis, t, degrees[axis])
         x, before, matrix, condition = interpolation(t, degrees[axis])
         if not condition <= CONDITION_LIMIT:
             raise BvbError(

@@ -54,8 +54,15 @@ def blossom_weights(t: Floats, p: int, args: Floats, before: float, near: int, w
             j = last - count + k + i
             left, right = t[j], t[j + p - k + 1]
             share = weights[i] / (right - left)
-            weights[i + 1] += (x - left) * share
-            weights[i] = (right - x) * share
+            # The larger part is what the smaller leaves: weights sum up to one, and no error is repeated p times.
+            if x - left < right - x:
+                part = (x - left) * share
+                weights[i + 1] += part
+                weights[i] -= part
+            else:
+                part = (right - x) * share
+                weights[i + 1] += weights[i] - part
+                weights[i] = part
     return last - count
 
 

@@ -163,10 +163,11 @@ class TensorSpline:
         gap = t[p + 1 : n + p] - t[1:n]
         # At a knot of full multiplicity the spline jumps: the difference across it is no derivative.
         keep = np.flatnonzero(gap > 0)
-        slope = p / gap[keep]
-        matrix = Banded(keep.astype(np.int64), np.stack([-slope, slope], axis=1), n)
+        differences = Banded(keep.astype(np.int64), np.tile([-1.0, 1.0], (len(keep), 1)), n).apply(self.control, axis)
         knots = np.delete(t, np.flatnonzero(gap <= 0) + 1)[1:-1]
-        return self._with_axis(axis, p - 1, knots, matrix.apply(self.control, axis), trusted=False)
+        with np.errstate(over="ignore", invalid="ignore"):
+            control = differences * (p / gap[keep]).reshape(-1, *(1,) * (self.parameters - axis))
+        return self._with_axis(axis, p - 1, knots, control, trusted=False)
 
     def antiderivative(self, axis: int) -> "TensorSpline":
         """Return the integral along ``axis`` from its start, a spline of one degree more.
@@ -189,8 +190,8 @@ class TensorSpline:
         of float64.
         """
         values = self.control
-        for (a, b), t, p in zip(self._box(box), self.knots, self.degrees, strict=True):
-            cut = _cut(t, p, a, b)
+        for axis, ((a, b), t, p) in enumerate(zip(self._box(box), self.knots, self.degrees, strict=True)):
+            cut = _cut(axis, t, p, a, b)
             first = int(np.searchsorted(cut, a))
             n = int(np.searchsorted(cut, b)) - first
             weights = np.zeros(len(cut) - p - 1)
@@ -271,9 +272,11 @@ class TensorSpline:
             raise BvbError(f"Axis {axis}: a tolerance of {shown(tolerance)} allows nothing. Choose a number >= 0.")
         p, n = self.degrees[axis], self.size[axis]
         moved = np.moveaxis(self.control, axis, 0)
-        knots, net, bound = remove_within(
-            self.knots[axis], p, np.ascontiguousarray(moved.reshape(n, -1)), tolerance, self._held(axis, held), at, most
-        )
+        held = self._held(axis, held)
+        with np.errstate(over="ignore", invalid="ignore"):
+            knots, net, bound = remove_within(
+                self.knots[axis], p, np.ascontiguousarray(moved.reshape(n, -1)), tolerance, held, at, most
+            )
         control = np.moveaxis(net.reshape(len(net), *moved.shape[1:]), 0, axis)
         return self._with_axis(axis, p, knots, control), bound
 
@@ -336,7 +339,7 @@ class TensorSpline:
 
     def _restricted(self, axis: int, a: float, b: float) -> "TensorSpline":
         t, p = self.knots[axis], self.degrees[axis]
-        cut = _cut(t, p, a, b)
+        cut = _cut(axis, t, p, a, b)
         first = int(np.searchsorted(cut, a))
         # Of p + 1 copies at a jump inside, those at the end b belong to the part before it.
         n = int(np.searchsorted(cut, b)) - first
@@ -448,10 +451,10 @@ def _supports(t: Floats, p: int) -> Floats:
     return np.asarray(t[p + 1 :] - t[: -p - 1])
 
 
-def _cut(t: Floats, p: int, a: float, b: float) -> Floats:
-    """Return the knots ``t`` with p + 1 copies of ``a`` and ``b``."""
+def _cut(axis: int, t: Floats, p: int, a: float, b: float) -> Floats:
+    """Return the knots ``t`` of ``axis`` with p + 1 copies of ``a`` and ``b``. Raises BvbError next to another knot."""
     more = [np.repeat(x, p + 1 - np.sum(t == x)) for x in dict.fromkeys((a, b))]
-    return np.sort(np.concatenate([t, *more]))
+    return checked_knots_of(axis, np.sort(np.concatenate([t, *more])), p)
 
 
 def _polynomials(t: Floats, p: int) -> Floats:

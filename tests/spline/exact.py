@@ -9,6 +9,7 @@ insertion, elevation, products and all the rest. Nothing here is shared with bvb
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Sequence
 from functools import cache
+from itertools import pairwise
 from math import comb
 from typing import Any
 
@@ -32,16 +33,15 @@ def spline(knots: Sequence[float], degree: int, control: Sequence[float]) -> Fun
         with mpmath.workdps(DIGITS + GUARD):
             s = min(bisect_right(t, a) - 1, len(t) - p - 2)
             d = [[mpmath.mpf(float(control[i]))] for i in range(s - p, s + 1)]
+            near = [mpmath.mpf(v) for v in t[s - p : s + p + 1]]
+            start = [a - v for v in near]
             for r in range(1, p + 1):
                 for j in range(p, r - 1, -1):
-                    left, right = mpmath.mpf(t[s - p + j]), mpmath.mpf(t[s + 1 + j - r])
-                    share = 1 / (right - left)
-                    # (x - left) d_j + (right - x) d_{j-1}, with x = a + h
+                    # d_{j-1} + (x - left) (d_j - d_{j-1}) / (right - left), with x = a + h
+                    share = 1 / (near[1 + j - r + p] - near[j])
                     slope = [(u - v) * share for u, v in zip(d[j], d[j - 1], strict=True)]
-                    flat = [
-                        ((a - left) * u + (right - a) * v) * share for u, v in zip(d[j], d[j - 1], strict=True)
-                    ]
-                    d[j] = [flat[0], *(f + g for f, g in zip(flat[1:], slope[:-1], strict=True)), slope[-1]]
+                    flat = [v + start[j] * w for v, w in zip(d[j - 1], slope, strict=True)]
+                    d[j] = [flat[0], *(u + w for u, w in zip(flat[1:], slope[:-1], strict=True)), slope[-1]]
             return d[p]
 
     return series
@@ -50,6 +50,7 @@ def spline(knots: Sequence[float], degree: int, control: Sequence[float]) -> Fun
 def total(functions: Sequence[Function], weights: Sequence[float]) -> Function:
     """Return the weighted sum."""
 
+    @cache
     def series(a: Any) -> Series:
         with mpmath.workdps(DIGITS + GUARD):
             parts = [[mpmath.mpf(float(w)) * c for c in f(a)] for f, w in zip(functions, weights, strict=True)]
@@ -61,6 +62,7 @@ def total(functions: Sequence[Function], weights: Sequence[float]) -> Function:
 def product(f: Function, g: Function) -> Function:
     """Return the pointwise product."""
 
+    @cache
     def series(a: Any) -> Series:
         with mpmath.workdps(DIGITS + GUARD):
             u, v = f(a), g(a)
@@ -76,6 +78,7 @@ def product(f: Function, g: Function) -> Function:
 def derivative(f: Function) -> Function:
     """Return the derivative within the pieces."""
 
+    @cache
     def series(a: Any) -> Series:
         with mpmath.workdps(DIGITS + GUARD):
             c = f(a)
@@ -89,7 +92,7 @@ def antiderivative(f: Function, breaks: Iterable[float]) -> Function:
     with mpmath.workdps(DIGITS + GUARD):
         ends = sorted(set(map(float, breaks)))
         table, start = {}, mpmath.mpf(0)
-        for a, b in zip(ends[:-1], ends[1:], strict=True):
+        for a, b in pairwise(ends):
             table[a] = [start, *(c / (k + 1) for k, c in enumerate(f(a)))]
             start = _horner(table[a], mpmath.mpf(b) - a)
     return lambda a: table[float(a)]
@@ -108,7 +111,7 @@ def integral(f: Function, breaks: Sequence[float], low: float, high: float) -> A
     """Return the integral over [low, high] of f, a polynomial between ``breaks``."""
     with mpmath.workdps(DIGITS + GUARD):
         ends = sorted({low, high, *(float(b) for b in breaks if low < b < high)})
-        pieces = ((f(a), mpmath.mpf(b) - a) for a, b in zip(ends[:-1], ends[1:], strict=True))
+        pieces = ((f(a), mpmath.mpf(b) - a) for a, b in pairwise(ends))
         return mpmath.fsum(_horner([0, *(c / (k + 1) for k, c in enumerate(s))], width) for s, width in pieces)
 
 
