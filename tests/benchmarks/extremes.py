@@ -69,7 +69,9 @@ def many_knots() -> dict[str, float]:
 
 
 def main() -> None:
-    every = Table("operation", "extreme", "degrees 0 ... 3", "4 ... 16", title="errors in ulps of the largest control point")
+    every = Table(
+        "operation", "extreme", "degrees 0 ... 3", "4 ... 16", title="errors in ulps of the largest control point"
+    )
     short = Table("ulps of the largest control point, degrees 0 ... 3 / 4 ... 16", box=MARKDOWN)
     for group in (*GROUPS, f"{MANY:,} knots, cubic"):
         short.add_column(group)
