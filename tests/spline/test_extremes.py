@@ -308,7 +308,7 @@ OPERATIONS: dict[str, Operation] = {
     "to Bezier": Operation(bezier),
     "elevate to 16": Operation(elevate),
     "elevate, reduce": Operation(reduce),
-    "insert, remove": Operation(remove, high=1024, slow=True),
+    "insert, remove": Operation(remove, high=4096, slow=True),
     "remove, bound": Operation(simplify),
     "split, join": Operation(join_parts, high=1024, slow=True),
     "make compatible": Operation(unite),
