@@ -11,7 +11,7 @@ from bvbedit.brdf.fit import LARGEST_REFLECTANCE, Progress, fit_over
 from bvbedit.brdf.geometry import Bools, Floats
 from bvbedit.brdf.metrics import compare
 from bvbedit.brdf.spline_brdf import SplineBrdf
-from bvbedit.brdf.structure import with_faces
+from bvbedit.brdf.structure import FACE_ROUNDING, with_faces
 from bvbedit.errors import BvbError
 from bvbedit.spline import compatible
 from bvbedit.spline.arguments import shown
@@ -94,8 +94,13 @@ def blend(
         _, merged = compatible.make_compatible(a.spline, b.spline)
         if merged:
             notes.append(f"{len(merged)} knots that were equal up to rounding were united")
-        model = with_faces(compatible.blend(a.spline, b.spline, share), a, b)
-        return model.told(blend={**told, "exact": True}, notes=notes)
+        spline = compatible.blend(a.spline, b.spline, share)
+        model = with_faces(spline, a, b)
+        moved = float(np.abs(model.spline.control - spline.control).max())
+        exact = moved <= FACE_ROUNDING * float(np.abs(spline.control).max())
+        if not exact:
+            notes.append(f"t is not flat at a degenerate face: encoded values were changed by up to {moved:.3g} there")
+        return model.told(blend={**told, "exact": exact}, notes=notes)
     mixture = Mixture(a, b, share, encoding)
     like = compatible.make_compatible(a.spline, b.spline)[0][0] if a.chart is b.chart else a.spline
     fitted = fit_over(mixture, a.chart, a.encoding, like.knots, like.degrees, progress=progress)

@@ -23,11 +23,13 @@ class Banded:
 
     def apply(self, x: Floats, axis: int) -> Floats:
         """Return the matrix times ``x`` along ``axis``: (..., columns, ...) to (..., m, ...)."""
+        from bvbedit.jit import threads_for
         from bvbedit.spline import kernels
 
         view, shape = _as_three(x, axis)
         out = np.empty((view.shape[0], len(self.rows), view.shape[2]))
-        kernels.apply_banded(self.first, self.rows, view, out)
+        with threads_for(self.rows.shape[1] * out.size):
+            kernels.apply_banded(self.first, self.rows, view, out)
         return out.reshape((*shape[:axis], len(self.rows), *shape[axis + 1 :]))
 
     def apply_transposed(self, x: Floats, axis: int) -> Floats:

@@ -57,7 +57,8 @@ def unite_knots(
         raise BvbError(f"Tolerance {shown(tolerance)} cannot tell knots apart. Choose one in 0 ... 0.001.")
     merged: list[MergedKnot] = []
     out = list(splines)
-    for axis in axes:
+    # The last axis first: the nets are small while the contiguous runs are short.
+    for axis in sorted(axes, reverse=True):
         vectors = _moved(axis, [s.knots[axis] for s in out], tolerance, merged)
         if not refined:
             out = [_with_knots(s, axis, t) for s, t in zip(out, vectors, strict=True)]
@@ -74,7 +75,7 @@ def unite_knots(
                 out[k] = out[k]._with_axis(axis, target, union.copy(), matrix.apply(out[k].control, axis))
             else:
                 out[k] = _with_knots(out[k], axis, union.copy())
-    return tuple(out), tuple(merged)
+    return tuple(out), tuple(sorted(merged, key=lambda m: m.axis))
 
 
 def _with_knots(spline: TensorSpline, axis: int, t: Floats) -> TensorSpline:
@@ -139,11 +140,13 @@ def combine(splines: Sequence[TensorSpline], weights: Sequence[ArrayLike]) -> Te
         if s.channels != channels:
             raise BvbError(f"Spline {k} has {s.channels} channels, the first {channels}. They must agree.")
     factors = [checked_factor(w, channels, f"Weight {k}") for k, w in enumerate(weights)]
-    same, _ = make_compatible(*splines)
     with np.errstate(over="ignore", invalid="ignore"):
-        net = same[0].control * factors[0]
-        for s, w in zip(same[1:], factors[1:], strict=True):
-            net += s.control * w
+        # Weighed while they are small.
+        weighed = [assembled(s.degrees, s.knots, s.control * w) for s, w in zip(splines, factors, strict=True)]
+        same, _ = make_compatible(*weighed)
+        net = same[0].control
+        for s in same[1:]:
+            net = net + s.control
     if not all_finite(net):
         raise BvbError("The combination leaves the range of float64. Choose smaller weights.")
     return assembled(same[0].degrees, same[0].knots, net)

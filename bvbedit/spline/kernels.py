@@ -12,6 +12,8 @@ Indices = NDArray[np.int64]
 # Values of one row worked on at once in the kernels that pass over a band twice: what they need stays in the
 # second-level cache.
 CHUNK = 1536
+# Contiguous runs shorter than this, as the channels of the last axis, do not pay for slices.
+SHORT = 16
 
 
 # Loops run over slices taken beforehand: indices that start at zero are known not to wrap, so that they vectorise
@@ -58,10 +60,21 @@ def band_column(row: Floats, x: Floats, out: Floats) -> None:
 @parallel_kernel
 def apply_banded(first: Indices, rows: Floats, x: Floats, out: Floats) -> None:
     """out[b, i, :] = sum_j rows[i, j] x[b, first[i] + j, :]."""
+    before, _, after = x.shape
     m, k = rows.shape
-    for line in prange(x.shape[0] * m):
-        b, i = line // m, line % m
-        band_row(rows[i], x[b, first[i] : first[i] + k], out[b, i])
+    if after >= SHORT:
+        for line in prange(before * m):
+            b, i = line // m, line % m
+            band_row(rows[i], x[b, first[i] : first[i] + k], out[b, i])
+    else:
+        for b in prange(before):
+            for i in range(m):
+                start = first[i]
+                for a in range(after):
+                    total = 0.0
+                    for j in range(k):
+                        total += rows[i, j] * x[b, start + j, a]
+                    out[b, i, a] = total
 
 
 @parallel_kernel

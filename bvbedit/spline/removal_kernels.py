@@ -57,6 +57,28 @@ def free_share(y: Floats, first: int, count: int, n: int, held_0: int, held_1: i
 
 
 @kernel
+def null_product(y: Floats, share: float, net: Floats, rows: Indices, out: Floats) -> None:
+    """out = sum_i y[i] / share net[rows[i], :], two rows in one pass."""
+    out[:] = 0.0
+    count = len(rows)
+    for i in range(0, count - 1, 2):
+        y0, y1, x0, x1 = y[i] / share, y[i + 1] / share, net[rows[i]], net[rows[i + 1]]
+        for a in range(len(out)):
+            out[a] += y0 * x0[a] + y1 * x1[a]
+    if count % 2:
+        y0, x0 = y[count - 1] / share, net[rows[count - 1]]
+        for a in range(len(out)):
+            out[a] += y0 * x0[a]
+
+
+@kernel
+def replace_row(x: Floats, neighbour: Floats, share: float, own: float) -> None:
+    """x = (x - share neighbour) / own."""
+    for a in range(len(x)):
+        x[a] = (x[a] - share * neighbour[a]) / own
+
+
+@kernel
 def removal_cost(
     t: Floats, p: int, r: int, net: Floats, row_of: Indices, n: int, held_0: int, held_1: int, alpha: Floats, y: Floats
 ) -> float:
@@ -68,12 +90,19 @@ def removal_cost(
     share = free_share(y, first, count, n, held_0, held_1)
     if share == 0.0:
         return np.inf
-    total = np.zeros(net.shape[1])
-    for i in range(count):
-        factor, row = y[i] / share, net[row_of[first + i]]
-        for a in range(len(total)):
-            total[a] += factor * row[a]
-    return float(np.abs(total).max())
+    total = np.empty(net.shape[1])
+    null_product(y, share, net, row_of[first : first + count], total)
+    # Four running maxima, as each step waits for the one before it.
+    m0 = m1 = m2 = m3 = 0.0
+    last = len(total) - len(total) % 4
+    for a in range(0, last, 4):
+        m0 = max(m0, abs(total[a]))
+        m1 = max(m1, abs(total[a + 1]))
+        m2 = max(m2, abs(total[a + 2]))
+        m3 = max(m3, abs(total[a + 3]))
+    for a in range(last, len(total)):
+        m0 = max(m0, abs(total[a]))
+    return max(max(m0, m1), max(m2, m3))
 
 
 @kernel
@@ -92,17 +121,18 @@ def remove_one(
     while middle + 1 < count - 1 and alpha[middle + 1] >= 0.5:
         middle += 1
     rows = row_of[first : first + count].copy()
-    total = np.zeros(net.shape[1])
-    for i in range(count):
-        total += (y[i] / share) * net[rows[i]]
+    total = np.empty(net.shape[1])
+    null_product(y, share, net, rows, total)
     for i in range(count):
         if y[count + i] != 0.0:
-            net[rows[i]] -= np.sign(y[i]) * total
+            sign, row = np.sign(y[i]), net[rows[i]]
+            for a in range(len(row)):
+                row[a] -= sign * total[a]
     for i in range(1, middle + 1):
-        net[rows[i]] = (net[rows[i]] - (1.0 - alpha[i]) * net[rows[i - 1]]) / alpha[i]
+        replace_row(net[rows[i]], net[rows[i - 1]], 1.0 - alpha[i], alpha[i])
     # From the right, control point i - 1 comes from equation i: until the end it is stored one row later.
     for i in range(count - 2, middle + 1, -1):
-        net[rows[i]] = (net[rows[i]] - alpha[i] * net[rows[i + 1]]) / (1.0 - alpha[i])
+        replace_row(net[rows[i]], net[rows[i + 1]], alpha[i], 1.0 - alpha[i])
     # What stands in row middle + 1 was the equation left over.
     for i in range(first + middle + 1, n - 1):
         row_of[i] = row_of[i + 1]
@@ -123,11 +153,12 @@ def remove_cheapest(
     may_go: NDArray[np.bool_],
     budget: float,
     most: int,
-) -> tuple[int, float]:
+) -> tuple[int, float, float]:
     """Remove the knot that costs least, again and again, while the costs sum up to ``budget`` at most.
 
     ``costs`` (knots,) hold the cost of each knot, nan where it is to be computed; ``may_go`` (knots,) tells which of
-    them may be removed. Returns the number of removed knots, ``most`` at most, and the sum of their costs.
+    them may be removed. Returns the number of removed knots, ``most`` at most, the sum of their costs,
+    and the cost of the next one.
     """
     alpha, y = np.empty(p + 2), np.empty(2 * (p + 2))
     removed, spent = 0, 0.0
@@ -141,7 +172,7 @@ def remove_cheapest(
             if costs[k] < best:
                 best, r = costs[k], k
         if r < 0 or spent + best > budget or removed == most:
-            return removed, spent
+            return removed, spent, best
         remove_one(t[: n + p + 1], p, r, net, row_of, n, held_0, held_1, alpha, y)
         spent += best
         removed += 1
