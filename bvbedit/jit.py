@@ -3,16 +3,12 @@
 Modules that import this one pay for importing numba (0.25 s), so they are imported where they are needed.
 """
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numba
 
 F = TypeVar("F", bound=Callable[..., Any])
-
-# Multiplications and additions: half a millisecond of one thread.
-WORTH_SHARING = 1 << 21
 
 
 def _compile(function: F, **options: Any) -> F:
@@ -29,23 +25,6 @@ def kernel(function: F) -> F:
     Its arguments are taken to be right: nothing is checked inside.
     """
     return _compile(function, nogil=True)
-
-
-@contextmanager
-def threads_for(work: int) -> Iterator[None]:
-    """Let parallel kernels use one thread only while there is little ``work`` (operations) to share.
-
-    Waking a second thread takes microseconds on an idle machine, but milliseconds on a busy one.
-    """
-    before = numba.get_num_threads()
-    if work >= WORTH_SHARING or before == 1:
-        yield
-        return
-    numba.set_num_threads(1)
-    try:
-        yield
-    finally:
-        numba.set_num_threads(before)
 
 
 def parallel_kernel(function: F) -> F:

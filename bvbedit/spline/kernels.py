@@ -14,6 +14,8 @@ Indices = NDArray[np.int64]
 CHUNK = 1536
 # Contiguous runs shorter than this, as the channels of the last axis, do not pay for slices.
 SHORT = 16
+# Rows that a thread takes at once.
+ROWS = 8
 
 
 # Loops run over slices taken beforehand: indices that start at zero are known not to wrap, so that they vectorise
@@ -57,24 +59,42 @@ def band_column(row: Floats, x: Floats, out: Floats) -> None:
             oj[a] += r * x[a]
 
 
-@parallel_kernel
+@kernel
+def apply_rows(first: Indices, rows: Floats, x: Floats, out: Floats, start: int, stop: int) -> None:
+    """out[i, :] = sum_j rows[i, j] x[first[i] + j, :] for i from ``start`` to before ``stop``."""
+    after, k = x.shape[1], rows.shape[1]
+    if after >= SHORT:
+        for i in range(start, stop):
+            band_row(rows[i], x[first[i] : first[i] + k], out[i])
+        return
+    done = 4 if k >= 4 else 0
+    for i in range(start, stop):
+        f = first[i]
+        for a in range(after):
+            total = 0.0
+            if done:
+                total = rows[i, 0] * x[f, a] + rows[i, 1] * x[f + 1, a]
+                total += rows[i, 2] * x[f + 2, a] + rows[i, 3] * x[f + 3, a]
+            for j in range(done, k):
+                total += rows[i, j] * x[f + j, a]
+            out[i, a] = total
+
+
+@kernel
 def apply_banded(first: Indices, rows: Floats, x: Floats, out: Floats) -> None:
     """out[b, i, :] = sum_j rows[i, j] x[b, first[i] + j, :]."""
-    before, _, after = x.shape
-    m, k = rows.shape
-    if after >= SHORT:
-        for line in prange(before * m):
-            b, i = line // m, line % m
-            band_row(rows[i], x[b, first[i] : first[i] + k], out[b, i])
-    else:
-        for b in prange(before):
-            for i in range(m):
-                start = first[i]
-                for a in range(after):
-                    total = 0.0
-                    for j in range(k):
-                        total += rows[i, j] * x[b, start + j, a]
-                    out[b, i, a] = total
+    for b in range(len(x)):
+        apply_rows(first, rows, x[b], out[b], 0, len(rows))
+
+
+@parallel_kernel
+def apply_banded_shared(first: Indices, rows: Floats, x: Floats, out: Floats) -> None:
+    """Do what ``apply_banded`` does, on all threads."""
+    m = len(rows)
+    blocks = (m + ROWS - 1) // ROWS
+    for piece in prange(len(x) * blocks):
+        b, start = piece // blocks, ROWS * (piece % blocks)
+        apply_rows(first, rows, x[b], out[b], start, min(start + ROWS, m))
 
 
 @parallel_kernel

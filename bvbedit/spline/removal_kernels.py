@@ -14,6 +14,8 @@ Indices = NDArray[np.int64]
 
 # Products of quotients of knots are kept below this.
 LARGE = 1e150
+# Lines worked on at once, so that a sum over control points stays in the first-level cache.
+CHUNK = 1024
 
 
 @kernel
@@ -57,16 +59,16 @@ def free_share(y: Floats, first: int, count: int, n: int, held_0: int, held_1: i
 
 
 @kernel
-def null_product(y: Floats, share: float, net: Floats, rows: Indices, out: Floats) -> None:
-    """out = sum_i y[i] / share net[rows[i], :], two rows in one pass."""
+def null_product(y: Floats, share: float, net: Floats, rows: Indices, start: int, out: Floats) -> None:
+    """out = sum_i y[i] / share net[rows[i], start : start + len(out)], two rows in one pass."""
     out[:] = 0.0
-    count = len(rows)
+    count, stop = len(rows), start + len(out)
     for i in range(0, count - 1, 2):
-        y0, y1, x0, x1 = y[i] / share, y[i + 1] / share, net[rows[i]], net[rows[i + 1]]
+        y0, y1, x0, x1 = y[i] / share, y[i + 1] / share, net[rows[i], start:stop], net[rows[i + 1], start:stop]
         for a in range(len(out)):
             out[a] += y0 * x0[a] + y1 * x1[a]
     if count % 2:
-        y0, x0 = y[count - 1] / share, net[rows[count - 1]]
+        y0, x0 = y[count - 1] / share, net[rows[count - 1], start:stop]
         for a in range(len(out)):
             out[a] += y0 * x0[a]
 
@@ -90,18 +92,22 @@ def removal_cost(
     share = free_share(y, first, count, n, held_0, held_1)
     if share == 0.0:
         return np.inf
-    total = np.empty(net.shape[1])
-    null_product(y, share, net, row_of[first : first + count], total)
+    rows = row_of[first : first + count]
+    lines = net.shape[1]
+    total = np.empty(min(CHUNK, lines))
     # Four running maxima, as each step waits for the one before it.
     m0 = m1 = m2 = m3 = 0.0
-    last = len(total) - len(total) % 4
-    for a in range(0, last, 4):
-        m0 = max(m0, abs(total[a]))
-        m1 = max(m1, abs(total[a + 1]))
-        m2 = max(m2, abs(total[a + 2]))
-        m3 = max(m3, abs(total[a + 3]))
-    for a in range(last, len(total)):
-        m0 = max(m0, abs(total[a]))
+    for start in range(0, lines, CHUNK):
+        size = min(CHUNK, lines - start)
+        null_product(y, share, net, rows, start, total[:size])
+        last = size - size % 4
+        for a in range(0, last, 4):
+            m0 = max(m0, abs(total[a]))
+            m1 = max(m1, abs(total[a + 1]))
+            m2 = max(m2, abs(total[a + 2]))
+            m3 = max(m3, abs(total[a + 3]))
+        for a in range(last, size):
+            m0 = max(m0, abs(total[a]))
     return max(max(m0, m1), max(m2, m3))
 
 
@@ -122,7 +128,7 @@ def remove_one(
         middle += 1
     rows = row_of[first : first + count].copy()
     total = np.empty(net.shape[1])
-    null_product(y, share, net, rows, total)
+    null_product(y, share, net, rows, 0, total)
     for i in range(count):
         if y[count + i] != 0.0:
             sign, row = np.sign(y[i]), net[rows[i]]
