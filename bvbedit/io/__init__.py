@@ -1,13 +1,12 @@
 """Files in and out, one module per format. Knows nothing of rendering or editing."""
 
 import os
-from pathlib import Path
 
 from bvbedit.brdf.base import Brdf
 from bvbedit.brdf.measured import MeasuredBrdf
 from bvbedit.brdf.spline_brdf import SplineBrdf
 from bvbedit.errors import BvbError
-from bvbedit.io.files import check_target, make_folder, reading
+from bvbedit.io.files import as_path, check_target, make_folder, reading
 
 __all__ = ["check_target", "load", "make_folder", "save"]
 
@@ -33,7 +32,7 @@ def load(path: str | os.PathLike[str]) -> Brdf:
         with reading(path) as stream:
             is_model = META in Archive(stream, str(path))
         return load_bvb(path) if is_model else load_table(path)
-    if int.from_bytes(head[:4], "little", signed=True) == 90 or Path(path).suffix.lower() == ".binary":
+    if int.from_bytes(head[:4], "little", signed=True) == 90 or as_path(path).suffix.lower() == ".binary":
         from bvbedit.io.merl import load_merl
 
         return load_merl(path)
@@ -46,7 +45,7 @@ def save(model: Brdf, path: str | os.PathLike[str], *, precision: str = "float32
     ``precision`` (float16, float32 or float64) is that of the control points in a .bvb file. The file is written
     beside its target and moved into place. Raises BvbError for another suffix, and where it cannot be written.
     """
-    suffix = Path(path).suffix.lower()
+    suffix = as_path(path).suffix.lower()
     if isinstance(model, SplineBrdf):
         from bvbedit.io.bvb import save_bvb
 

@@ -13,6 +13,7 @@ from bvbedit.brdf.spline_brdf import SplineBrdf
 from bvbedit.errors import BvbError
 from bvbedit.io.archive import Archive, write_archive
 from bvbedit.io.files import reading, replacing
+from bvbedit.spline.arguments import shown
 from bvbedit.spline.tensor import TensorSpline
 
 FORMAT = "bvbedit"
@@ -20,17 +21,19 @@ VERSION = 1
 PRECISIONS = ("float16", "float32", "float64")
 META = "meta.json"
 
-# Limits in bytes, far above any net that makes sense and far below what would hurt.
+# Limits far above any net that makes sense and far below what would hurt; in bytes ...
 LARGEST_FILE = 1 << 28
 LARGEST_META = 1 << 24
-LARGEST_KNOTS = 1 << 21
-LARGEST_CONTROL = 1 << 27
+# ... and in numbers, which take 8 bytes in memory however small they are stored.
+MOST_KNOTS = 1 << 18
+MOST_CONTROL = 1 << 24
 
 
 def dumps(model: SplineBrdf, precision: str = "float32") -> bytes:
     """Return ``model`` as the bytes of a .bvb file, its control points rounded to ``precision``.
 
-    Raises BvbError for an unknown precision and for control points that it cannot hold.
+    Raises BvbError for an unknown precision, control points that it cannot hold, a report that is no JSON, and more
+    of anything than ``loads`` would take.
     """
     if precision not in PRECISIONS:
         raise BvbError(f"Unknown precision {precision!r}. Choose one of {', '.join(PRECISIONS)}.")
@@ -46,10 +49,20 @@ def dumps(model: SplineBrdf, precision: str = "float32") -> bytes:
         "degrees": list(model.spline.degrees),
         "report": dict(model.report),
     }
+    try:
+        text = json.dumps(meta, allow_nan=False)
+    except (TypeError, ValueError, RecursionError) as error:
+        raise BvbError(f"The model's report is no JSON: {shown(str(error))}. Give texts and finite numbers.") from None
+    longest = max(len(t) for t in model.spline.knots)
+    if control.size > MOST_CONTROL or longest > MOST_KNOTS or len(text) > LARGEST_META:
+        raise BvbError(
+            f"{control.size:,} control values, {longest:,} knots on an axis and {len(text):,} bytes of report are too "
+            f"much for a file. Keep within {MOST_CONTROL:,}, {MOST_KNOTS:,} and {LARGEST_META:,}."
+        )
     arrays = {f"knots_{axis}": knots for axis, knots in enumerate(model.spline.knots)}
     arrays["control"] = control.astype(precision)
     stream = io.BytesIO()
-    write_archive(stream, arrays, {META: json.dumps(meta, allow_nan=False)}, level=9)
+    write_archive(stream, arrays, {META: text}, level=9)
     return stream.getvalue()
 
 
@@ -61,16 +74,18 @@ def loads(content: bytes, name: str = "model") -> SplineBrdf:
     archive = Archive(io.BytesIO(content), name)
     meta = archive.object(META, LARGEST_META)
     if meta.get("format") != FORMAT:
-        raise archive.corrupt(f"its format is {meta.get('format')!r}, not {FORMAT!r}")
+        raise archive.corrupt(f"its format is {shown(meta.get('format'))}, not {FORMAT!r}")
     version = meta.get("version")
     if not isinstance(version, int) or isinstance(version, bool) or version < 1:
-        raise archive.corrupt(f"its version is {version!r}")
+        raise archive.corrupt(f"its version is {shown(version)}")
     if version > VERSION:
-        raise BvbError(f"{name} has format version {version}; this bvbedit reads up to {VERSION}. Update bvbedit.")
+        raise BvbError(
+            f"{name} has format version {shown(version)}; this bvbedit reads up to {VERSION}. Update bvbedit."
+        )
     try:
         degrees = _whole_numbers(meta.get("degrees"))
-        knots = [archive.array(f"knots_{a}", ("float64",), 1, LARGEST_KNOTS) for a in range(len(degrees))]
-        control = archive.array("control", PRECISIONS, len(degrees) + 1, LARGEST_CONTROL)
+        knots = [archive.array(f"knots_{a}", ("float64",), 1, MOST_KNOTS) for a in range(len(degrees))]
+        control = archive.array("control", PRECISIONS, len(degrees) + 1, MOST_CONTROL)
         spline = TensorSpline(degrees, knots, control)
         encoding = meta.get("encoding")
         report = meta.get("report", {})
@@ -85,7 +100,7 @@ def loads(content: bytes, name: str = "model") -> SplineBrdf:
 
 def _whole_numbers(value: Any) -> list[int]:
     if not isinstance(value, list) or not all(isinstance(v, int) and not isinstance(v, bool) for v in value):
-        raise BvbError(f"degrees are {value!r}, not a list of whole numbers.")
+        raise BvbError(f"degrees are {shown(value)}, not a list of whole numbers.")
     if len(value) != 3:
         raise BvbError(f"{len(value)} degrees given: a BRDF has three parameters.")
     return value
@@ -106,7 +121,7 @@ def load_bvb(path: str | os.PathLike[str]) -> SplineBrdf:
 def stored_precision(path: str | os.PathLike[str]) -> str:
     """Return the precision in which the file ``path`` holds its control points."""
     archive = Archive(io.BytesIO(_content(path)), str(path))
-    return str(archive.array("control", PRECISIONS, 4, LARGEST_CONTROL).dtype)
+    return str(archive.array("control", PRECISIONS, 4, MOST_CONTROL).dtype)
 
 
 def _content(path: str | os.PathLike[str]) -> bytes:

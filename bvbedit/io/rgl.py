@@ -23,6 +23,8 @@ TYPES = {1: "<u1", 2: "<i1", 3: "<u2", 4: "<i2", 5: "<u4", 6: "<i4", 7: "<u8", 8
 
 # Far above any file of the database (0.6 to 15 MB in RGB) and far below what would hurt.
 LARGEST_FILE = 1 << 28
+# Numbers, which take 8 bytes in memory however small they are stored, and may lie over one another in the file.
+MOST_NUMBERS = 1 << 24
 MOST_FIELDS = 256
 MOST_DIMENSIONS = 8
 WANTED = ("phi_i", "theta_i", "sigma", "ndf", "vndf", "rgb", "jacobian")
@@ -46,6 +48,9 @@ def load_rgl(path: str | os.PathLike[str]) -> RglBrdf:
             raise BvbError(f"it has no field {', '.join(missing)}. Get the file again from where it came.")
         if len(fields["phi_i"]) > 2:
             raise BvbError(f"it is anisotropic ({len(fields['phi_i'])} azimuths). Choose an isotropic material.")
+        count = sum(fields[name].size for name in WANTED)
+        if count > MOST_NUMBERS:
+            raise BvbError(f"it claims {count:,} numbers in all. Get the material's isotropic *_rgb.bsdf.")
         description = fields.get("description", np.zeros(0, "<u1")).tobytes().decode("utf-8", "replace")
         return RglBrdf(
             theta_i=fields["theta_i"],

@@ -12,6 +12,7 @@ from bvbedit import BvbError
 from bvbedit.brdf.charts import CHARTS, FITTING_CHARTS
 from bvbedit.brdf.encodings import Linear, Log, Root
 from bvbedit.brdf.spline_brdf import SplineBrdf
+from bvbedit.io import bvb
 from bvbedit.io.bvb import PRECISIONS, dumps, loads, stored_precision
 from tests.io import files
 
@@ -21,9 +22,9 @@ def members(content: bytes) -> dict[str, bytes]:
         return {name: archive.read(name) for name in archive.namelist()}
 
 
-def archive(parts: dict[str, bytes]) -> bytes:
+def archive(parts: dict[str, bytes], method: int = zipfile.ZIP_DEFLATED) -> bytes:
     stream = io.BytesIO()
-    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as out:
+    with zipfile.ZipFile(stream, "w", method) as out:
         for name, part in parts.items():
             out.writestr(name, part)
     return stream.getvalue()
@@ -74,6 +75,10 @@ def test_numpy_opens_it_without_pickle(tmp_path):
         assert arrays["control"].shape == (7, 5, 3, 3)
 
 
+def test_members_that_are_not_packed_are_read():
+    assert dumps(loads(archive(members(files.bvb()), zipfile.ZIP_STORED))) == files.bvb()
+
+
 def test_what_a_precision_cannot_hold_is_not_written(tmp_path):
     model = files.model()
     bright = model.with_spline(model.spline.with_control(model.spline.control * 1e6))
@@ -83,6 +88,12 @@ def test_what_a_precision_cannot_hold_is_not_written(tmp_path):
     with pytest.raises(BvbError, match="float99"):
         bvbedit.save(model, path, precision="float99")
     assert path.read_bytes() == b"old"
+
+
+def shaped(shape: str) -> bytes:
+    """Return an .npy member of a few zeros that claims ``shape``."""
+    text = f"{{'descr': '<f4', 'fortran_order': False, 'shape': {shape}, }}\n".encode()
+    return b"\x93NUMPY\2\0" + len(text).to_bytes(4, "little") + text + bytes(64)
 
 
 BOMB = archive({"meta.json": b" " * (1 << 26)})
@@ -111,6 +122,18 @@ HUGE = CONTROL.replace(b"(7, 5, 3, 3)", b"(7000000, 5000000, 3, 3)"[:12].ljust(1
         (changed(degrees=[3, 3, "2"]), "degrees"),
         (changed(degrees=[2, 3, 2]), "stands more than 3 times"),
         (changed(report=[]), "report"),
+        (changed(report={"a": float("nan")}), "NaN is no finite number"),
+        (changed(report={"a": -float("inf")}), "-Infinity is no finite number"),
+        (replaced("meta.json", b'{"report": 1e999}'), "1e999 is no finite number"),
+        (changed(format="x" * 9999), "format"),
+        (changed(version=10**4000), "version 1000"),
+        (changed(version=[1] * 9999), "version"),
+        (changed(degrees=[[3] * 9999]), "degrees"),
+        (replaced("control.npy", shaped("(" + "7, " * 999 + ")")), "has shape"),
+        (replaced("control.npy", shaped("(" + "9, " * 3 + "9" * 3000 + ")")), "claims shape"),
+        (archive(members(files.bvb()), zipfile.ZIP_BZIP2), "meta.json is packed by method 12"),
+        (archive(members(files.bvb()), zipfile.ZIP_LZMA), "meta.json is packed by method 14"),
+        (archive(members(files.bvb()) | {f"{n:040}": b"" for n in range(12_500)}), "list of members is too long"),
         (replaced("meta.json", b"{"), "not JSON"),
         (replaced("meta.json", b"[1]"), "not a JSON object"),
         (replaced("meta.json", b"\xff\xfe"), "not JSON"),
@@ -139,6 +162,35 @@ def test_what_is_no_sound_model_is_refused(content, word, tmp_path):
         loads(content, str(path))
     assert str(path) in str(refusal.value)
     assert "\n" not in str(refusal.value)
+    assert len(str(refusal.value)) < len(str(path)) + 350
+
+
+@pytest.mark.parametrize(("limit", "word"), [("MOST_CONTROL", "control"), ("MOST_KNOTS", "knots")])
+def test_numbers_are_counted_however_small_they_are_stored(limit, word, monkeypatch):
+    """In memory each takes 8 bytes, in a file of float16 two."""
+    content = {p: dumps(files.model(), p) for p in PRECISIONS}
+    monkeypatch.setattr(bvb, limit, 7)
+    for part in content.values():
+        with pytest.raises(BvbError, match=rf"{word}\S* has [0-9]+ entries, more than the 7 allowed"):
+            loads(part)
+    with pytest.raises(BvbError, match="too much for a file"):
+        dumps(files.model())
+
+
+def test_a_report_longer_than_would_be_read_is_not_written(monkeypatch):
+    monkeypatch.setattr(bvb, "LARGEST_META", 100)
+    with pytest.raises(BvbError, match="bytes of report are too much"):
+        dumps(files.model())
+
+
+@pytest.mark.parametrize("entry", [float("nan"), float("inf"), 1j, {1, 2}, np.float32(1)])
+def test_a_report_that_is_no_json_is_not_written(entry, tmp_path):
+    m = files.model()
+    spoiled = SplineBrdf(m.spline, m.chart, m.encoding, {"a": entry})
+    with pytest.raises(BvbError, match="report is no JSON") as refusal:
+        bvbedit.save(spoiled, tmp_path / "m.bvb")
+    assert "\n" not in str(refusal.value)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_every_flipped_bit_of_an_array_is_noticed():

@@ -70,26 +70,55 @@ except bvbedit.BvbError as error:
 """
 
 
-def test_a_write_that_fails_halfway_leaves_the_old_file(tmp_path):
-    """The kernel itself stops the file at a megabyte, as a quota does."""
-    path = files.written(tmp_path / "t.binary", b"old")
+def run_limited(code: str, largest: int, *arguments: str) -> str:
+    """Run ``code`` where the kernel stops every file at ``largest`` bytes, as a quota does; return what it prints."""
 
     def limit() -> None:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (1 << 20, 1 << 20))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (largest, largest))
 
     # Bytecode and compiled kernels are not to run into the limit.
     environment = os.environ | {"PYTHONDONTWRITEBYTECODE": "1"}
-    done = subprocess.run(
-        [sys.executable, "-c", LIMITED, str(path)],
-        preexec_fn=limit,
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert done.stdout.startswith(f"{path} cannot be written: File too large")
+    command = [sys.executable, "-c", code, *arguments]
+    return subprocess.run(command, preexec_fn=limit, env=environment, capture_output=True, text=True, check=True).stdout
+
+
+def test_a_write_that_fails_halfway_leaves_the_old_file(tmp_path):
+    path = files.written(tmp_path / "t.binary", b"old")
+    assert run_limited(LIMITED, 1 << 20, str(path)).startswith(f"{path} cannot be written: File too large")
     assert path.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [path]
+
+
+PICTURES = """
+import signal, sys, numpy as np
+from bvbedit import BvbError
+from bvbedit.io.exr import write_exr
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+for size in sys.argv[2:]:
+    height, width = map(int, size.split("x"))
+    try:
+        write_exr(sys.argv[1], np.random.default_rng(0).random((height, width, 3)))
+        print("written")
+    except BvbError as error:
+        print(error)
+"""
+
+
+@pytest.mark.parametrize("largest", [0, 100, 300])
+def test_pictures_of_any_size_that_do_not_fit_on_the_disk_leave_the_old_file(largest, tmp_path):
+    """OpenEXR itself says nothing where the rest of a small picture does not fit."""
+    path = files.written(tmp_path / "p.exr", b"old")
+    sizes = ["1x1", "4x4", "8x1", "17x31", "100x100"]
+    told = run_limited(PICTURES, largest, str(path), *sizes).splitlines()
+    assert len(told) == len(sizes)
+    assert all(line.startswith(f"{path} cannot be written: ") for line in told)
+    assert path.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_pictures_that_just_fit_are_written(tmp_path):
+    path = tmp_path / "p.exr"
+    assert run_limited(PICTURES, 1 << 20, str(path), "1x1", "17x31") == "written\nwritten\n"
 
 
 @pytest.mark.parametrize("name", ["missing/m.bvb", "file/m.bvb", "folder"])
@@ -151,6 +180,60 @@ def test_a_pipe_is_refused_and_does_not_hang(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(BvbError, match="pipe"), reading(tmp_path / "pipe"):
         pass
+
+
+@pytest.mark.parametrize("path", ["a\0b.bvb", b"a.bvb", 7, None, "\ud800.bvb"])
+def test_what_can_name_no_file_is_refused_in_one_line(path):
+    for use in (
+        lambda: bvbedit.load(path),
+        lambda: bvbedit.save(files.model(), path),
+        lambda: check_target(path, (".bvb",)),
+        lambda: make_folder(path),
+    ):
+        with pytest.raises(BvbError, match="cannot name a file") as refusal:
+            use()
+        assert "\n" not in str(refusal.value)
+
+
+def test_pipes_and_devices_are_no_targets_and_stay(tmp_path):
+    """Moved into place, a new file would stand where the pipe was, or a device of the whole machine.
+
+    Devices are only looked at: written by the superuser with a defect here, /dev/null would be gone.
+    """
+    pipe = tmp_path / "pipe.bvb"
+    os.mkfifo(pipe)
+    with pytest.raises(BvbError, match="is a device or a pipe"), replacing(pipe):
+        pass
+    assert list(tmp_path.iterdir()) == [pipe]
+    assert pipe.is_fifo()
+    for target in (pipe, Path("/dev/null")):
+        with pytest.raises(BvbError, match="is a device or a pipe"):
+            check_target(target, (target.suffix,))
+
+
+def test_names_of_long_characters_are_written(tmp_path):
+    """244 of the 255 bytes that a name has: that of the temporary file must not be longer."""
+    path = tmp_path / ("\N{ARTIST PALETTE}" * 60 + ".bvb")
+    bvbedit.save(files.model(), path)
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_names_that_are_too_long_are_told(tmp_path):
+    for use in (lambda p: bvbedit.save(files.model(), p), lambda p: check_target(p, (".bvb",)), bvbedit.load):
+        with pytest.raises(BvbError, match="File name too long"):
+            use(tmp_path / ("a" * 300 + ".bvb"))
+
+
+def test_errors_of_the_system_without_a_number_are_told(tmp_path):
+    """Libraries raise OSError with a text alone, which has no strerror."""
+
+    def spoiled() -> None:
+        with replacing(tmp_path / "f"):
+            raise OSError("the library\nfailed")
+
+    with pytest.raises(BvbError, match="cannot be written: the library failed"):
+        spoiled()
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_targets_are_checked_before_long_work(tmp_path):

@@ -105,3 +105,17 @@ def test_sizes_that_overflow_64_bits_are_refused(tmp_path, fields):
     path.write_bytes(huge)
     with pytest.raises(BvbError, match="does not lie within"):
         load_rgl(path)
+
+
+def test_fields_that_lie_over_one_another_are_counted_each(tmp_path, fields):
+    """A byte may stand for a number of every field, and takes 8 bytes of memory for each."""
+    zeros = np.zeros(1, np.uint8)
+    sound = bsdf_bytes(fields | {"sigma": np.zeros((1, 1), np.uint8), "ndf": np.zeros((1, 1), np.uint8), "end": zeros})
+    content = bytearray(sound + bytes(9 << 20))
+    for name in (b"sigma", b"ndf"):
+        at = content.index(name + b"\x02\x00\x01") + len(name) + 3
+        content[at : at + 24] = np.array([len(sound), 9, 1 << 20], "<u8").tobytes()
+    path = tmp_path / "over.bsdf"
+    path.write_bytes(content)
+    with pytest.raises(BvbError, match=r"claims 18,8\S* numbers in all"):
+        load_rgl(path)

@@ -10,6 +10,7 @@ import bvbedit
 from bvbedit import BvbError
 from bvbedit.brdf.charts import CHARTS
 from bvbedit.brdf.measured import MeasuredBrdf
+from bvbedit.io import table as table_format
 from tests.io import files
 
 
@@ -76,3 +77,15 @@ def test_what_is_no_sound_table_is_refused(changes, word, tmp_path):
     with pytest.raises(BvbError, match=word) as refusal:
         bvbedit.load(path)
     assert str(path) in str(refusal.value)
+
+
+@pytest.mark.parametrize("limit", ["MOST_VALUES", "MOST_NODES"])
+def test_more_numbers_than_would_be_read_are_not_written(limit, tmp_path, monkeypatch):
+    path = packed(tmp_path / "t.npz", values=arrays()["values"].astype(np.float32))
+    table = bvbedit.load(path)
+    monkeypatch.setattr(table_format, limit, 5)
+    with pytest.raises(BvbError, match="entries, more than the"):
+        bvbedit.load(path)
+    with pytest.raises(BvbError, match="too much for a file"):
+        bvbedit.save(table, tmp_path / "u.npz")
+    assert list(tmp_path.iterdir()) == [path]
