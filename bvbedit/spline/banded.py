@@ -34,6 +34,15 @@ class Banded:
         apply(self.first, self.rows, view, out)
         return out.reshape((*shape[:axis], len(self.rows), *shape[axis + 1 :]))
 
+    def largest_difference(self, x: Floats, y: Floats, axis: int) -> float:
+        """Return the largest entry of |matrix times ``x`` - ``y``| along ``axis``, infinite where it overflows.
+
+        Nothing of that size is stored: fresh memory takes longer than the arithmetic.
+        """
+        from bvbedit.spline import kernels
+
+        return float(kernels.largest_difference(self.first, self.rows, _as_three(x, axis)[0], _as_three(y, axis)[0]))
+
     def apply_transposed(self, x: Floats, axis: int) -> Floats:
         """Return the transposed matrix times ``x`` along ``axis``: (..., m, ...) to (..., columns, ...)."""
         from bvbedit.spline import kernels

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bvbedit.jit import kernel
+from bvbedit.spline.kernels import largest_size
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -95,20 +96,12 @@ def removal_cost(
     rows = row_of[first : first + count]
     lines = net.shape[1]
     total = np.empty(min(CHUNK, lines))
-    # Four running maxima, as each step waits for the one before it.
-    m0 = m1 = m2 = m3 = 0.0
+    largest = 0.0
     for start in range(0, lines, CHUNK):
-        size = min(CHUNK, lines - start)
-        null_product(y, share, net, rows, start, total[:size])
-        last = size - size % 4
-        for a in range(0, last, 4):
-            m0 = max(m0, abs(total[a]))
-            m1 = max(m1, abs(total[a + 1]))
-            m2 = max(m2, abs(total[a + 2]))
-            m3 = max(m3, abs(total[a + 3]))
-        for a in range(last, size):
-            m0 = max(m0, abs(total[a]))
-    return max(max(m0, m1), max(m2, m3))
+        part = total[: min(CHUNK, lines - start)]
+        null_product(y, share, net, rows, start, part)
+        largest = max(largest, largest_size(part))
+    return largest
 
 
 @kernel
@@ -187,3 +180,24 @@ def remove_cheapest(
             costs[k], may_go[k] = costs[k + 1], may_go[k + 1]
         for k in range(max(p + 1, r - p - 1), min(n, r + p + 2)):
             costs[k] = np.nan
+
+
+@kernel
+def to_lines(net: Floats, rows: Floats) -> None:
+    """Lay ``net`` (before, n, after) out as ``rows`` (n, before * after): a line for each column."""
+    before, n, after = net.shape
+    for b in range(before):
+        for i in range(n):
+            for a in range(after):
+                rows[i, b * after + a] = net[b, i, a]
+
+
+@kernel
+def from_lines(rows: Floats, row_of: Indices, net: Floats) -> None:
+    """Put the rows named by ``row_of`` (n,) back into ``net`` (before, n, after)."""
+    before, n, after = net.shape
+    for b in range(before):
+        for i in range(n):
+            row = rows[row_of[i]]
+            for a in range(after):
+                net[b, i, a] = row[b * after + a]

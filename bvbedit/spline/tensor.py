@@ -239,7 +239,8 @@ class TensorSpline:
         """Return the spline with as many interior knots of ``axis`` removed as ``tolerance`` allows, and the bound.
 
         The bound, at most ``tolerance``, is certified: no value of any channel changes by more. The knot that costs
-        least goes first. ``held`` control points at the two ends stay, by default one, so that end values do.
+        least goes first. ``held`` values and derivatives at the two ends stay, by default the values alone: the first
+        and the last control points of the change, over the knots as they were, are zero.
         Raises BvbError for an unknown axis, and for a tolerance below zero or not finite.
         """
         return self._without(axis, tolerance, held, None, -1)
@@ -270,14 +271,10 @@ class TensorSpline:
         axis = self._axis(axis)
         if not is_real_within(tolerance, 0.0, np.finfo(np.float64).max):
             raise BvbError(f"Axis {axis}: a tolerance of {shown(tolerance)} allows nothing. Choose a number >= 0.")
-        p, n = self.degrees[axis], self.size[axis]
-        moved = np.moveaxis(self.control, axis, 0)
-        held = self._held(axis, held)
-        with np.errstate(over="ignore", invalid="ignore"):
-            knots, net, bound = remove_within(
-                self.knots[axis], p, np.ascontiguousarray(moved.reshape(n, -1)), tolerance, held, at, most
-            )
-        control = np.moveaxis(net.reshape(len(net), *moved.shape[1:]), 0, axis)
+        p = self.degrees[axis]
+        knots, control, bound = remove_within(
+            self.knots[axis], p, self.control, axis, tolerance, self._held(axis, held), at, most
+        )
         return self._with_axis(axis, p, knots, control), bound
 
     def elevate(self, axis: int, by: int = 1) -> "TensorSpline":
@@ -295,16 +292,18 @@ class TensorSpline:
     ) -> tuple["TensorSpline", float]:
         """Return the nearest spline with the degree of ``axis`` lowered ``by``, and the certified bound of the change.
 
-        What ``elevate`` added goes without loss. ``held`` control points at the two ends stay, by default one, so that
-        end values do. Raises BvbError for an unknown axis, below degree 0, and where the bound passes ``tolerance``.
+        What ``elevate`` added goes without loss. ``held`` values and derivatives at the two ends stay, by default the
+        values alone. Raises BvbError for an unknown axis, below degree 0, for more held than the new degree has, and
+        where the bound passes ``tolerance``.
         """
         axis = self._axis(axis)
         p = self.degrees[axis]
         if tolerance is not None and not is_real_within(tolerance, 0.0, np.inf):
             raise BvbError(f"Axis {axis}: a tolerance of {shown(tolerance)} allows nothing. Choose a number >= 0.")
         by = checked_reduction(p, by, axis)
+        ends = (0, 0) if held is None and by == p else self._held(axis, held)
         with np.errstate(over="ignore", invalid="ignore"):
-            knots, control, bound = reduced(self.knots[axis], p, self.control, axis, by, self._held(axis, held))
+            knots, control, bound = reduced(self.knots[axis], p, self.control, axis, by, ends)
         if not np.isfinite(bound):
             raise BvbError(f"Axis {axis}: reducing the degree leaves the range of float64. Scale the spline.")
         if tolerance is not None and bound > tolerance:
@@ -317,7 +316,7 @@ class TensorSpline:
     def split(self, axis: int, at: float) -> tuple["TensorSpline", "TensorSpline"]:
         """Return the parts before and after the parameter ``at`` inside the domain of ``axis``, both clamped.
 
-        Raises BvbError for an unknown axis and a parameter that is not strictly inside.
+        Raises BvbError for an unknown axis and a parameter that is not strictly inside, or within 1e-100 of a knot.
         """
         axis = self._axis(axis)
         a, b = self.domain[axis]

@@ -40,12 +40,12 @@ def seconds(work: Callable[[], object]) -> float:
     return perf_counter() - start
 
 
-def medians(*works: Callable[[], object]) -> list[float]:
+def medians(*works: Callable[[], object], rounds: int = ROUNDS) -> list[float]:
     """Return the median time of each work, their rounds interleaved so that a noisy minute hits all alike."""
     for work in works:
         work()
-    rounds = [[seconds(work) for work in works] for _ in range(ROUNDS)]
-    return [median(times) for times in zip(*rounds, strict=True)]
+    times = [[seconds(work) for work in works] for _ in range(rounds)]
+    return [median(t) for t in zip(*times, strict=True)]
 
 
 def axes() -> list[np.ndarray]:
