@@ -11,7 +11,7 @@ from bvbedit.spline.knots import Floats
 from bvbedit.spline.refinement import insertion
 
 # Times the largest control point and the distance of 1 from the next number.
-ROUNDING = 16.0
+ROUNDING = 4.0
 
 
 def remove_within(
@@ -36,7 +36,8 @@ def remove_within(
     left = n if most < 0 else most
     before, after = int(np.prod(net.shape[:axis])), int(np.prod(net.shape[axis + 1 :]))
     rows = np.empty((n, before * after))
-    removal_kernels.to_lines(net.reshape(before, n, after), rows)
+    lines = net.reshape(before, n, after)
+    removal_kernels.to_lines(lines, rows)
     knots, row_of = t.copy(), np.arange(n)
     costs, may_go = np.full(len(t), np.nan), np.ones(len(t), dtype=bool) if at is None else t == at
 
@@ -46,6 +47,11 @@ def remove_within(
     def result() -> tuple[Floats, Floats]:
         control = np.empty((before, n, after))
         removal_kernels.from_lines(rows, row_of[:n], control)
+        # Held, the end values are what they were to the last bit.
+        if held[0]:
+            control[:, 0] = lines[:, 0]
+        if held[1]:
+            control[:, -1] = lines[:, -1]
         return knots[: n + p + 1].copy(), control.reshape(*net.shape[:axis], n, *net.shape[axis + 1 :])
 
     spent = 0.0
