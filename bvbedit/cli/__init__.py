@@ -36,7 +36,7 @@ def main() -> None:
     # processors from those that do the work: a fit took 13 % longer. Who sets the variable has it his way.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
-        app(result_action="return_value")
+        app(sys.argv[1:], result_action="return_value")
     except BvbError as error:
         _fail(str(error))
     except KeyboardInterrupt:
