@@ -16,7 +16,10 @@ FITS: dict[str, tuple[str, dict[str, Any]]] = {
     "half-diff": ("half-diff, root, 48 KiB", {"chart": "half-diff", "encoding": "root"}),
 }
 PICTURE: dict[str, Any] = {"width": 320, "height": 320, "spp": 64}
-AMPLIFIED = 32
+# Differences are made visible by a power of two, so that one pixel in a hundred is as bright as can be.
+LARGEST_AMPLIFICATION = 128
+# Every third node of each axis is enough for the floor that noise sets.
+FLOOR_STRIDE = 3
 
 
 def demo(*, out: Path = Path("bvbedit-demo"), as_json: Json = False) -> None:
@@ -65,15 +68,22 @@ def demo(*, out: Path = Path("bvbedit-demo"), as_json: Json = False) -> None:
             **api.compare(models[name], measured).to_dict(),
         }
 
-    errors = _pictures(out, measured, models)
-    drawn = _screenshot(out, measured, models["half-diff"])
+    _tell("Comparing all with the material without noise")
+    truth = {
+        name: api.compare(brdf, material.brdf, stride=FLOOR_STRIDE).grid.log_cosine_rms
+        for name, brdf in {"measured": measured, **models}.items()
+    }
+    errors = _pictures(out, material.brdf, measured, models)
+    missing = _screenshot(out, measured, models["half-diff"])
     with replacing(out / "report.md") as stream:
-        stream.write(_report(material.description, rows, errors, drawn).encode())
+        table_bytes = (out / f"{MATERIAL}.binary").stat().st_size
+        stream.write(_report(material.description, table_bytes, rows, truth, errors, missing).encode())
     report(
         {
             "folder": str(out),
             "report": str(out / "report.md"),
             "files": sorted(f.name for f in out.iterdir()),
+            "notes": [missing] if missing else [],
             "seconds": perf_counter() - start,
         },
         as_json,
@@ -81,14 +91,18 @@ def demo(*, out: Path = Path("bvbedit-demo"), as_json: Json = False) -> None:
 
 
 def _tell(line: str) -> None:
+    """Say what is being done, where somebody watches."""
     import sys
 
-    print(line, file=sys.stderr)
+    if sys.stderr.isatty():
+        print(line, file=sys.stderr)
 
 
-def _pictures(out: Path, measured: Any, models: dict[str, Any]) -> dict[str, Any]:
-    """Render measurement and models with the same random numbers; return the image errors of each model."""
+def _pictures(out: Path, truth: Any, measured: Any, models: dict[str, Any]) -> dict[str, Any]:
+    """Render truth, measurement and models with the same random numbers; return image errors against the truth."""
     from dataclasses import asdict
+
+    import numpy as np
 
     from bvbedit import api
     from bvbedit.io.exr import write_exr
@@ -98,21 +112,27 @@ def _pictures(out: Path, measured: Any, models: dict[str, Any]) -> dict[str, Any
     from bvbedit.render.tonemap import tone_map
 
     pictures = {}
-    for name, brdf in {"measured": measured, **models}.items():
+    for name, brdf in {"truth": truth, "measured": measured, **models}.items():
         _tell(f"Rendering {name}")
         pictures[name] = api.render(brdf, "sphere", **PICTURE)
         write_exr(out / f"{name}.exr", pictures[name])
     toned = {name: tone_map(p) for name, p in pictures.items()}
-    panels = [("measured", toned["measured"])]
-    for name in models:
-        panels.append((FITS[name][0], toned[name]))
-        panels.append((f"difference x {AMPLIFIED}", amplified_difference(toned[name], toned["measured"], AMPLIFIED)))
-    write_png(out / "comparison.png", sheet(panels))
-    return {name: asdict(compare_pictures(pictures[name], pictures["measured"])) for name in models}
+    shown = {"measured": "measurement, with noise", **{name: label for name, (label, _) in FITS.items()}}
+    largest = max(
+        float(np.percentile(np.abs(toned[name].astype(float) - toned["truth"]).max(axis=2), 99)) for name in shown
+    )
+    factor = next(f for f in (LARGEST_AMPLIFICATION, 64, 32, 16, 8, 4, 2, 1) if f * largest <= 255 or f == 1)
+    panels = [(label, toned[name]) for name, label in shown.items()]
+    panels += [
+        (f"its difference from the truth, x {factor}", amplified_difference(toned[name], toned["truth"], factor))
+        for name in shown
+    ]
+    write_png(out / "comparison.png", sheet(panels, columns=len(shown)))
+    return {name: asdict(compare_pictures(pictures[name], pictures["truth"])) for name in shown}
 
 
-def _screenshot(out: Path, measured: Any, model: Any) -> bool:
-    """Draw volume and lobes where OpenGL allows it; say why where it does not."""
+def _screenshot(out: Path, measured: Any, model: Any) -> str:
+    """Draw volume and lobes where OpenGL allows it; return why not where it does not."""
     import bvbedit_gui
     from bvbedit.errors import BvbError
 
@@ -120,14 +140,20 @@ def _screenshot(out: Path, measured: Any, model: Any) -> bool:
     try:
         bvbedit_gui.screenshot(model, out / "volume.png", measured=measured, title=MATERIAL)
     except BvbError as error:
-        _tell(f"No volume.png: {error}")
-        return False
-    return True
+        return f"No volume.png: {error}"
+    return ""
 
 
-def _report(description: str, rows: dict[str, Any], errors: dict[str, Any], drawn: bool) -> str:
-    def row(label: str, values: list[str]) -> str:
-        return f"| {label} | " + " | ".join(values) + " |"
+def _report(
+    description: str,
+    table_bytes: int,
+    rows: dict[str, Any],
+    truth: dict[str, float],
+    errors: dict[str, Any],
+    missing: str,
+) -> str:
+    def row(label: str, measured: str, values: list[str]) -> str:
+        return f"| {label} | {measured} | " + " | ".join(values) + " |"
 
     def metric(*path: str) -> list[str]:
         out = []
@@ -138,32 +164,50 @@ def _report(description: str, rows: dict[str, Any], errors: dict[str, Any], draw
             out.append(f"{value:.5g}")
         return out
 
+    def image(key: str, form: str) -> tuple[str, list[str]]:
+        return format(errors["measured"][key], form), [format(errors[name][key], form) for name in rows]
+
     lines = [
         f"# {MATERIAL}",
         "",
         f"{description}.",
         f"Measured by a simulated goniophotometer on MERL's grid with {NOISE:.0%} noise, and fitted twice.",
         "",
-        row("", [r["label"] for r in rows.values()]),
-        row("---", ["---"] * len(rows)),
-        row("control points", [" x ".join(map(str, r["size"])) for r in rows.values()]),
-        row("file", [f"[{r['file']}]({r['file']}), {r['file_bytes']:,} bytes" for r in rows.values()]),
-        row("payload", [f"{r['payload_bytes']:,} bytes" for r in rows.values()]),
-        row("fit", [f"{r['seconds']:.2f} s" for r in rows.values()]),
-        row("log-cosine RMS, grid", metric("grid", "log_cosine_rms")),
-        row("log-cosine RMS, nodes", metric("nodes", "log_cosine_rms")),
-        row("relative L1, grid", metric("grid", "relative_l1")),
-        row("E_avg of the paper, 1/sr", metric("paper", "e_avg")),
-        row("E_max of the paper, 1/sr", metric("paper", "e_max")),
-        row("image MAE", [f"{errors[n]['mae']:.5f}" for n in rows]),
-        row("image PAE", [f"{errors[n]['pae']:.5f}" for n in rows]),
-        row("image PSNR", [f"{errors[n]['psnr']:.1f} dB" for n in rows]),
+        row("", "the measurement itself", [r["label"] for r in rows.values()]),
+        row("---", "---", ["---"] * len(rows)),
+        row("control points", "", [" x ".join(map(str, r["size"])) for r in rows.values()]),
+        row(
+            "file",
+            f"{table_bytes:,} bytes",
+            [f"[{r['file']}]({r['file']}), {r['file_bytes']:,} bytes" for r in rows.values()],
+        ),
+        row("net and knots", "", [f"{r['payload_bytes']:,} bytes" for r in rows.values()]),
+        row("fit", "", [f"{r['seconds']:.2f} s" for r in rows.values()]),
+        row("**distance from the material without noise**", "", [""] * len(rows)),
+        row("log-cosine RMS, grid", f"{truth['measured']:.5g}", [f"{truth[name]:.5g}" for name in rows]),
+        row("picture: mean error", *image("mae", ".5f")),
+        row("picture: largest error", *image("pae", ".5f")),
+        row("picture: PSNR, dB", *image("psnr", ".1f")),
+        row("**distance from the measurement**", "", [""] * len(rows)),
+        row("log-cosine RMS, grid", "0", metric("grid", "log_cosine_rms")),
+        row("log-cosine RMS, nodes", "0", metric("nodes", "log_cosine_rms")),
+        row("relative L1, grid", "0", metric("grid", "relative_l1")),
+        row("mean error E_avg, 1/sr", "0", metric("paper", "e_avg")),
+        row("largest error E_max, 1/sr", "0", metric("paper", "e_max")),
         "",
-        "All errors are distances from the noisy measurement.",
+        "- *log-cosine RMS*: root mean square of the difference of log(1 + f cos theta_i cos theta_o), f being the",
+        "  reflectance. A model nearer to the material than the measurement is has smoothed its noise away.",
+        "- *grid*, *nodes*: where one looks: at even steps of both directions, or at the measurement's own nodes, most",
+        "  of them near the mirror direction.",
+        "- *relative L1*: sum of the errors by the sum of the values. *E_avg*, *E_max*: lengths of the RGB vector's",
+        "  error, up to grazing angles (Lee & Park 2008, equation 7).",
+        "- Pictures are compared as 8-bit sRGB, from 0 to 1: mean and largest difference (MAE, PAE), signal to noise.",
         "",
-        "![measurement, models and differences](comparison.png)",
+        "![measurement, models and their differences from the material](comparison.png)",
         "",
     ]
-    if drawn:
+    if missing:
+        lines += [missing, ""]
+    else:
         lines += ["Iso-value surfaces, control net and lobes of the half-diff model:", "", "![volume](volume.png)", ""]
     return "\n".join(lines)

@@ -206,7 +206,8 @@ def test_start_up_imports_neither_numba_nor_pyvista(folder):
 
 def test_demo_does_the_whole_job(run, tmp_path):
     out = tmp_path / "demo"
-    status, printed, _ = run("demo", "--out", out, "--json")
+    status, printed, err = run("demo", "--out", out, "--json")
+    assert err == ""  # no terminal, no progress
     told = one_object(printed)
     assert status == 0
     assert {"report.md", "comparison.png", "paper.bvb", "half-diff.bvb"} <= set(told["files"])
