@@ -2,15 +2,15 @@
 
 from collections.abc import Sequence
 from functools import cached_property
-from math import factorial
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from bvbedit.errors import BvbError
 from bvbedit.spline.arguments import is_real_within, is_whole, one_per_axis, real_array, shown
 from bvbedit.spline.banded import Banded
-from bvbedit.spline.basis import basis_derivatives, collocation, find_spans
+from bvbedit.spline.basis import collocation
+from bvbedit.spline.evaluation import MAX_PARAMETERS, Tables, evaluate_any, evaluate_cubic_rgb, tables
 from bvbedit.spline.knots import Floats, greville
 from bvbedit.spline.reduction import checked_reduction, reduced
 from bvbedit.spline.refinement import (
@@ -23,8 +23,6 @@ from bvbedit.spline.refinement import (
     with_inserted,
 )
 from bvbedit.spline.removal import remove_within
-
-MAX_PARAMETERS = 4
 
 
 class TensorSpline:
@@ -117,9 +115,9 @@ class TensorSpline:
                 _check_inside(x[:, axis], a, b, axis)
         out = np.empty((len(x), self.channels))
         if self.degrees == (3, 3, 3) and self.channels == 3:
-            self._evaluate_cubic_rgb(x, out)
+            evaluate_cubic_rgb(self.knots, self._tables, self.control, x, out)
         else:
-            self._evaluate_any(x, out)
+            evaluate_any(self.knots, self.degrees, self.control, x, out)
         return out.reshape(*shape, self.channels)
 
     def evaluate_grid(self, axes: Sequence[ArrayLike]) -> Floats:
@@ -393,41 +391,9 @@ class TensorSpline:
             spline = spline.derivative(axis, order)
         return spline
 
-    def _evaluate_cubic_rgb(self, x: Floats, out: Floats) -> None:
-        from bvbedit.spline import kernels
-
-        t0, t1, t2 = self.knots
-        b0, b1, b2 = self._bins
-        p0, p1, p2 = self._polynomials
-        kernels.evaluate_cubic_rgb(x, t0, t1, t2, b0, b1, b2, p0, p1, p2, self.control, out)
-
-    def _evaluate_any(self, x: Floats, out: Floats) -> None:
-        from bvbedit.spline import kernels
-
-        # Axes that are missing become constants of degree 0, so that one kernel serves 1 to 4 parameters.
-        missing = MAX_PARAMETERS - self.parameters
-        degrees = np.array((*self.degrees, *(0,) * missing), dtype=np.int64)
-        knots = (*self.knots, *(np.array([0.0, 1.0]),) * missing)
-        starts = np.cumsum([0, *(len(t) for t in knots)])
-        points = np.concatenate([x, np.zeros((len(x), missing))], axis=1)
-        spans = np.stack([find_spans(t, p, points[:, a]) for a, (t, p) in enumerate(zip(knots, degrees, strict=True))])
-        control = self.control.reshape(*self.size, *(1,) * missing, self.channels)
-        kernels.evaluate_any(
-            points, degrees, np.concatenate(knots), starts, np.ascontiguousarray(spans.T), control, out
-        )
-
     @cached_property
-    def _bins(self) -> tuple[NDArray[np.int64], ...]:
-        """The spans at the left ends of about four equal bins for each control point, for each axis."""
-        return tuple(
-            find_spans(t, p, np.linspace(t[0], t[-1], 4 * n + 1)[:-1])
-            for t, p, n in zip(self.knots, self.degrees, self.size, strict=True)
-        )
-
-    @cached_property
-    def _polynomials(self) -> tuple[Floats, ...]:
-        """The basis functions of each span, (spans, p+1, p+1), in powers of (u - t_s)/(t_{s+1} - t_s)."""
-        return tuple(_polynomials(t, p) for t, p in zip(self.knots, self.degrees, strict=True))
+    def _tables(self) -> Tables:
+        return tables(self.knots, self.degrees)
 
 
 def assembled(degrees: tuple[int, ...], knots: tuple[Floats, ...], control: Floats) -> TensorSpline:
@@ -454,16 +420,6 @@ def _cut(axis: int, t: Floats, p: int, a: float, b: float) -> Floats:
     """Return the knots ``t`` of ``axis`` with p + 1 copies of ``a`` and ``b``. Raises BvbError next to another knot."""
     more = [np.repeat(x, p + 1 - np.sum(t == x)) for x in dict.fromkeys((a, b))]
     return checked_knots_of(axis, np.sort(np.concatenate([t, *more])), p)
-
-
-def _polynomials(t: Floats, p: int) -> Floats:
-    """Taylor's series at the left end of each span; spans without length hold zeros, and are never looked up."""
-    out = np.zeros((len(t) - 1, p + 1, p + 1))
-    spans = np.flatnonzero(np.diff(t) > 0)
-    width = t[spans + 1] - t[spans]
-    for k in range(p + 1):
-        out[spans, :, k] = basis_derivatives(t, p, t[spans], k)[1] * (width**k / factorial(k))[:, None]
-    return out
 
 
 def _check_inside(x: Floats, a: float, b: float, axis: int) -> None:
