@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from bvbedit.errors import BvbError
-from bvbedit.spline.arguments import one_per_axis, real_array, shown
+from bvbedit.spline.arguments import real_array, shown
 from bvbedit.spline.basis import basis_values
 from bvbedit.spline.knots import Floats
 from bvbedit.spline.tensor import TensorSpline
@@ -53,7 +53,11 @@ def move_points(
         i = int(np.argwhere(~np.isfinite(change))[0][0])
         raise BvbError(f"The way to target {i} leaves the range of float64. Choose smaller targets.")
     if keep is not None:
-        still = real_array(keep, "Points to keep").reshape(-1, d) if np.size(keep) else np.empty((0, d))
+        still = real_array(keep, "Points to keep")
+        if still.size == 0:
+            still = np.empty((0, d))
+        if still.ndim != 2 or still.shape[1] != d:
+            raise BvbError(f"Points to keep have shape {still.shape}. Give them as (j, {d}).")
         spline.evaluate(still)
         x = np.concatenate([x, still])
         change = np.concatenate([change, np.zeros((len(still), spline.channels))])
@@ -98,7 +102,8 @@ def scale_region(
     factor = real_array(gain, "Gain")
     if factor.shape not in ((), (spline.channels,)) or not np.isfinite(factor).all():
         raise BvbError(f"Gain is {shown(gain)}. Give one finite number, or {spline.channels}, one for each channel.")
-    widths = real_array(one_per_axis(falloff, "Falloff") if np.ndim(falloff) else [falloff] * len(intervals), "Falloff")
+    widths = real_array(falloff, "Falloff")
+    widths = np.full(len(intervals), widths) if widths.ndim == 0 else widths
     if widths.shape != (len(intervals),) or not (widths >= 0).all() or not np.isfinite(widths).all():
         raise BvbError(f"Falloff is {shown(falloff)}. Give a length >= 0, or one for each axis.")
     weight = np.ones(())

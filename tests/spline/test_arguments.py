@@ -6,8 +6,12 @@ import numpy as np
 import pytest
 
 from bvbedit.spline.arguments import is_real_within, is_whole, one_per_axis, real_array, shown
+from bvbedit.spline.compatible import blend, combine, make_compatible
+from bvbedit.spline.diagnostics import slope_bounds
 from bvbedit.spline.fitting import fit_weighted, loft
 from bvbedit.spline.knots import checked_degree, checked_knots, clamped, place_knots
+from bvbedit.spline.operations import join, permute, reparametrise, reverse
+from bvbedit.spline.sculpting import move_points, scale_region
 from bvbedit.spline.tensor import TensorSpline
 from tests.spline.refusals import refusal
 
@@ -21,6 +25,14 @@ U = np.linspace(0, 1, 8)
 
 def _spline(**changes: object) -> TensorSpline:
     return TensorSpline(**({"degrees": (3,), "knots": (KNOTS,), "control": np.ones((4, 1))} | changes))
+
+
+def _halves() -> TensorSpline:
+    return _spline(knots=(clamped([0.5], 3),), control=np.ones((5, 1)))
+
+
+def _next() -> TensorSpline:
+    return _spline(knots=(clamped([], 3, 1.0, 2.0),))
 
 
 def _fit(**changes: object) -> object:
@@ -44,6 +56,46 @@ def _fit(**changes: object) -> object:
         lambda wrong: _spline().evaluate_grid([wrong]),
         lambda wrong: _spline().derivative(wrong),
         lambda wrong: _spline().derivative(0, wrong),
+        lambda wrong: _spline().antiderivative(wrong),
+        lambda wrong: _spline().integrate([wrong]),
+        lambda wrong: _spline().integrate([(0, wrong)]),
+        lambda wrong: _spline().insert_knots(wrong, [0.5]),
+        lambda wrong: _spline().insert_knots(0, wrong),
+        lambda wrong: _spline().refine(wrong, 2),
+        lambda wrong: _spline().refine(0, wrong),
+        lambda wrong: _spline().refine(0, knots=wrong),
+        lambda wrong: _spline().remove_knots(wrong, 0.1),
+        lambda wrong: _spline().remove_knots(0, wrong),
+        lambda wrong: _spline().remove_knots(0, 0.1, held=(wrong, 0)),
+        lambda wrong: _spline().remove_knot(0, wrong),
+        lambda wrong: _halves().remove_knot(0, 0.5, wrong),
+        lambda wrong: _spline().elevate(wrong),
+        lambda wrong: _spline().elevate(0, wrong),
+        lambda wrong: _spline().reduce(wrong),
+        lambda wrong: _spline().reduce(0, wrong),
+        lambda wrong: _spline().reduce(0, held=(0, wrong)),
+        lambda wrong: _spline().split(wrong, 0.5),
+        lambda wrong: _spline().split(0, wrong),
+        lambda wrong: _spline().restrict([wrong]),
+        lambda wrong: _spline().restrict([(wrong, 1)]),
+        lambda wrong: join(_spline(), _next(), wrong),
+        lambda wrong: reverse(_spline(), wrong),
+        lambda wrong: permute(_spline(), wrong),
+        lambda wrong: permute(_spline(), (wrong,)),
+        lambda wrong: reparametrise(_spline(), wrong, 0.0, 2.0),
+        lambda wrong: reparametrise(_spline(), 0, wrong, 2.0),
+        lambda wrong: reparametrise(_spline(), 0, 0.0, wrong),
+        lambda wrong: make_compatible(_spline(), tolerance=wrong),
+        lambda wrong: combine([_spline()], wrong),
+        lambda wrong: combine([_spline()], [wrong]),
+        lambda wrong: blend(_spline(), _spline(), wrong),
+        lambda wrong: move_points(_spline(), wrong, [[1.0]]),
+        lambda wrong: move_points(_spline(), [[0.5]], wrong),
+        lambda wrong: move_points(_spline(), [[0.5]], [[1.0]], keep=[wrong]),
+        lambda wrong: scale_region(_spline(), [wrong], 2.0),
+        lambda wrong: scale_region(_spline(), [(0, 1)], wrong),
+        lambda wrong: scale_region(_spline(), [(0, 1)], 2.0, wrong),
+        lambda wrong: slope_bounds(_spline(), wrong),
         checked_degree,
         lambda wrong: checked_knots(wrong, 3),
         lambda wrong: clamped(wrong, 3),
@@ -79,6 +131,13 @@ def test_every_door_refuses_what_is_no_number(door, wrong):
         lambda: _spline().derivative(0.0),
         lambda: _spline().derivative(True),
         lambda: _spline().derivative(0, True),
+        lambda: _spline().antiderivative(1),
+        lambda: TensorSpline((16,), (clamped([], 16),), np.ones((17, 1))).antiderivative(0),
+        lambda: _spline().integrate([(0, 1), (0, 1)]),
+        lambda: _spline().integrate([(0.6, 0.5)]),
+        lambda: _spline().integrate([(0, np.nan)]),
+        lambda: _spline().integrate([(-0.1, 0.5)]),
+        lambda: _spline().integrate(0.5),
         lambda: checked_degree(np.ones((40, 40))),
         lambda: checked_knots([0, 0, 0.5, 0.5, 0.5, 1, 1], 1),
         lambda: checked_knots([0, 0.1, 1, 2], 1),

@@ -4,13 +4,14 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bvbedit.spline.knots import clamped
 from bvbedit.spline.refinement import insertion
 from bvbedit.spline.tensor import TensorSpline
 from tests.spline import naive
+from tests.spline.drawn import EPS, change, largest, splines, with_axis
 from tests.spline.refusals import refusal
 
 
@@ -148,3 +149,50 @@ def test_what_cannot_be_removed_is_refused(rng):
     ):
         message = refusal(call)
         assert word in message or "hold" in message.lower(), message
+
+
+@pytest.mark.parametrize("degree", range(6))
+def test_rounding_never_takes_the_bound_beyond_the_tolerance(degree, rng):
+    """Constants cost nothing to within rounding, and a bound is a tolerance that is just met."""
+    for _ in range(30):
+        spline = _curve(rng, degree, degree + 6, 1)
+        constant = spline.with_control(np.full_like(spline.control, rng.uniform()))
+        assert constant.remove_knots(0, 0.0)[1] == 0.0
+        _, cost = spline.remove_knot(0, float(spline.knots[0][degree + 3]))
+        for tolerance in (cost, np.nextafter(cost, 0), 1e-17):
+            assert spline.remove_knots(0, tolerance)[1] <= tolerance
+
+
+@settings(max_examples=50)
+@given(with_axis(splines(tame=True)), st.floats(0, 3), st.data())
+def test_any_axis_is_thinned_within_the_bound_with_its_ends_held(drawn, tolerance, data):
+    spline, axis = drawn
+    p = spline.degrees[axis]
+    held = tuple(data.draw(st.integers(0, min(p + 1, 3))) for _ in range(2))
+    if sum(held) > spline.size[axis]:
+        held = (1, 0)
+    less, bound = spline.remove_knots(axis, tolerance, held=held)
+    scale = largest(spline) + largest(less)
+    assert bound <= tolerance
+    assert change(spline, less) <= bound + 64 * EPS * scale
+    rows = insertion(less.knots[axis], p, spline.knots[axis]).apply(less.control, axis)
+    off = np.abs(np.moveaxis(rows - spline.control, axis, 0))
+    assert (off[: held[0]] <= 64 * EPS * scale).all()
+    assert (off[len(off) - held[1] :] <= 64 * EPS * scale).all()
+    more, _ = spline.remove_knots(axis, 2 * tolerance, held=held)
+    assert more.size[axis] <= less.size[axis]
+
+
+def test_one_step_is_no_worse_than_a_linear_programme(rng):
+    """Every other net without the knot is further away: the optimum's signs alternate as often as they must."""
+    spline = _curve(rng, 3, 8, 1)
+    value = float(spline.knots[0][6])
+    less, bound = spline.remove_knot(0, value, held=(0, 0))
+    matrix = insertion(less.knots[0], 3, spline.knots[0]).dense()
+    off = (matrix @ less.control - spline.control)[:, 0]
+    reached = np.flatnonzero(np.abs(off) > bound * (1 - 1e-9))
+    # Kolmogorov: no change of the net lowers the error wherever it is largest.
+    y = np.linalg.svd(matrix.T)[2][-1]
+    support = np.flatnonzero(np.abs(y) > 1e-12)
+    assert set(support) <= set(reached)
+    assert abs(np.sign(y[support]) @ np.sign(off[support])) == len(support)

@@ -100,6 +100,8 @@ def test_a_region_is_scaled_by_its_greville_abscissae(rng):
         (lambda s: move_points(s, [[0.5, 0.5, np.nan]], [[1.0] * 3]), "nan"),
         (lambda s: move_points(s, [[0.5] * 3], [[1.0, np.inf, 0.0]]), "inf"),
         (lambda s: move_points(s, [[0.5] * 3], [[1.0] * 3], keep=[[2.0] * 3]), "2.0"),
+        (lambda s: move_points(s, [[0.5] * 3], [[1.0] * 3], keep=[[0.1, 0.2]]), "(1, 2)"),
+        (lambda s: move_points(s, [[0.5] * 3], [[1.0] * 3], keep=[0.1, 0.2, 0.3]), "(3,)"),
         (lambda s: move_points(s, "here", [[1.0] * 3]), "'here'"),
         (lambda s: scale_region(s, [(0, 1)] * 2, 2.0), "3 intervals"),
         (lambda s: scale_region(s, [(0, 1), (0, 1), (0.5, 2)], 2.0), "Axis 2"),
@@ -108,6 +110,8 @@ def test_a_region_is_scaled_by_its_greville_abscissae(rng):
         (lambda s: scale_region(s, [(0, 1)] * 3, [1.0, 2.0]), "Gain"),
         (lambda s: scale_region(s, [(0, 1)] * 3, 2.0, -0.1), "-0.1"),
         (lambda s: scale_region(s, [(0, 1)] * 3, 2.0, [0.1, 0.1]), "Falloff"),
+        (lambda s: scale_region(s, [(0, 1)] * 3, 2.0, [0.1, np.nan, 0.1]), "Falloff"),
+        (lambda s: scale_region(s, [(0, 1)] * 3, 2.0, np.inf), "inf"),
     ],
 )
 def test_what_makes_no_sense_is_refused(call, word, rng):

@@ -5,7 +5,7 @@ import itertools
 import numba
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bvbedit import BvbError
@@ -13,6 +13,7 @@ from bvbedit.spline.basis import collocation
 from bvbedit.spline.knots import clamped, greville
 from bvbedit.spline.tensor import TensorSpline
 from tests.spline import naive
+from tests.spline.drawn import EPS, largest, splines, with_axis
 
 # Degrees, sizes and channels: all dimensions, mixed degrees, as few control points as the degree allows, and the
 # tricubic RGB volume, which has a kernel of its own.
@@ -280,3 +281,71 @@ def test_knots_as_far_and_as_close_as_is_allowed_are_evaluated_right(start, inte
     x = np.unique([*t, *(start + (end - start) * np.linspace(0, 1, 9)), np.nextafter(end, start)])
     values = spline.evaluate(np.stack([x, x, x], axis=1))
     np.testing.assert_allclose(values, np.tile(x[:, None] / max(abs(start), end), channels), rtol=0, atol=1e-14)
+
+
+@settings(max_examples=50)
+@given(with_axis(splines(tame=True)))
+def test_the_derivative_of_the_antiderivative_is_the_spline(drawn):
+    spline, axis = drawn
+    p, t = spline.degrees[axis], spline.knots[axis]
+    if p == 16:
+        spline = spline.reduce(axis)[0]
+        p, t = spline.degrees[axis], spline.knots[axis]
+    summed = spline.antiderivative(axis)
+    assert summed.degrees[axis] == p + 1
+    assert not summed.control.take(0, axis).any()
+    back = summed.derivative(axis)
+    assert back.degrees == spline.degrees
+    np.testing.assert_array_equal(back.knots[axis], t)
+    least = (t[p + 1 :] - t[: -p - 1]).min()
+    noise = 8 * EPS * largest(summed) * (p + 1) / least
+    np.testing.assert_allclose(back.control, spline.control, rtol=0, atol=noise + 8 * EPS * largest(spline))
+
+
+@settings(max_examples=60)
+@given(splines(tame=True), st.data())
+def test_integrals_are_those_of_gauss_on_each_span_and_of_antiderivatives(spline, data):
+    """Over boxes that end at knots and between them, and over empty ones."""
+    if max(spline.degrees) == 16:
+        spline = spline.reduce(spline.degrees.index(16))[0]
+    box = []
+    for t in spline.knots:
+        share = st.integers(0, 32).map(lambda k, t=t: float(t[0] + (t[-1] - t[0]) * (k / 32)))
+        box.append(tuple(sorted((data.draw(share), data.draw(share)))))
+    nodes, weights = [], []
+    for t, p, (a, b) in zip(spline.knots, spline.degrees, box, strict=True):
+        x, w = np.polynomial.legendre.leggauss(p // 2 + 1)
+        ends = np.unique([a, *t[(t > a) & (t < b)], b])
+        half = np.diff(ends) / 2
+        nodes.append((ends[:-1, None] + half[:, None] * (1 + x)).ravel())
+        weights.append((half[:, None] * w).ravel())
+    expected = spline.evaluate_grid(nodes)
+    for w in weights:
+        expected = np.tensordot(w, expected, axes=(0, 0))
+    volume = np.prod([t[-1] - t[0] for t in spline.knots])
+    # A parameter near 1e6 is rounded by 1e-10 of a domain of length 1.
+    unit = max(np.abs(t).max() / (t[-1] - t[0]) for t in spline.knots)
+    slack = 256 * EPS * (1 + unit) * largest(spline) * volume
+    found = spline.integrate(box)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=slack)
+    summed = spline
+    for axis in range(spline.parameters):
+        summed = summed.antiderivative(axis)
+    corners = summed.evaluate_grid(box)
+    for _ in box:
+        corners = corners[-1] - corners[0]
+    np.testing.assert_allclose(found, corners, rtol=0, atol=slack * 2**spline.parameters)
+    np.testing.assert_array_equal(spline.integrate(), spline.integrate(spline.domain))
+    if any(a == b for a, b in box):
+        np.testing.assert_array_equal(found, 0.0)
+    constant = spline.with_control(np.ones_like(spline.control))
+    np.testing.assert_allclose(constant.integrate(), volume, rtol=64 * EPS)
+
+
+def test_the_integral_of_the_whole_is_the_sum_of_its_parts(rng):
+    spline = _spline(rng, (3, 2), (8, 6), 3)
+    whole, cut = spline.integrate(), spline.knots[0][5]
+    for at in (0.123, cut):
+        parts = [spline.integrate([(0.0, at), (0.0, 1.0)]), spline.integrate([(at, 1.0), (0.0, 1.0)])]
+        np.testing.assert_allclose(sum(parts), whole, rtol=0, atol=1e-14)
+        np.testing.assert_allclose(sum(s.integrate() for s in spline.split(0, at)), whole, rtol=0, atol=1e-14)
