@@ -7,9 +7,10 @@ from numpy.typing import ArrayLike
 
 from bvbedit.brdf.base import Brdf
 from bvbedit.brdf.encodings import Linear, Log
-from bvbedit.brdf.fit import LARGEST_REFLECTANCE, Progress, fit_over
+from bvbedit.brdf.fit import Progress, fit_over
 from bvbedit.brdf.geometry import Bools, Floats
-from bvbedit.brdf.metrics import compare
+from bvbedit.brdf.metrics import estimate
+from bvbedit.brdf.sample_sets import LARGEST_REFLECTANCE
 from bvbedit.brdf.spline_brdf import SplineBrdf
 from bvbedit.brdf.structure import FACE_ROUNDING, with_faces
 from bvbedit.errors import BvbError
@@ -19,8 +20,6 @@ from bvbedit.spline.tensor import TensorSpline
 
 # The encodings in which the two spaces of reflectance are mixed; a net in that encoding is mixed exactly.
 SPACES = {"net": None, "linear": Linear(), "log": Log(1e-3)}
-# Every fifth node of each axis, as in the report of a fit.
-REPORT_STRIDE = 5
 
 
 class Mixture(Brdf):
@@ -103,8 +102,8 @@ def blend(
         return model.told(blend={**told, "exact": exact}, notes=notes)
     mixture = Mixture(a, b, share, encoding)
     like = compatible.make_compatible(a.spline, b.spline)[0][0] if a.chart is b.chart else a.spline
-    fitted = fit_over(mixture, a.chart, a.encoding, like.knots, like.degrees, progress=progress)
-    metrics = {"stride": REPORT_STRIDE, **compare(fitted, mixture, stride=REPORT_STRIDE).to_dict()}
+    fitted = fit_over(mixture, a.chart, a.encoding, like.knots, like.degrees, progress=progress).stored_as(a.storage)
+    metrics = estimate(fitted, mixture).to_dict()
     notes = [
         *notes,
         "sampled and refitted: metrics tell how far the model is from the mixture",

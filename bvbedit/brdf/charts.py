@@ -39,7 +39,11 @@ class Chart(ABC):
     reciprocal: bool
     """Whether (wi, wo) and (wo, wi) have the same parameters."""
     grid: tuple[Floats, Floats, Floats]
-    """The nodes on which measured data are resampled before a fit; ``tests/benchmarks`` tells what that costs."""
+    """The nodes on which the chart's measurements are taken."""
+    fitting_grid: tuple[Floats, Floats, Floats]
+    """The nodes on which data are resampled before a fit; ``tests/benchmarks`` tells what that costs."""
+    trial_grid: tuple[Floats, Floats, Floats]
+    """Fewer nodes, to try whether the chart suits a material at all."""
     hold_order: tuple[int, int, int]
     """The axes along which a node without data takes the value of its smaller neighbour, the first choice first."""
 
@@ -75,6 +79,8 @@ class InOut(Chart):
     degenerate_faces = (DegenerateFace(axis=0, along=2, layers=1), DegenerateFace(axis=1, along=2, layers=1))
     reciprocal = False
     grid = (np.arange(91) / 90, np.arange(91) / 90, np.arange(361) / 360)
+    fitting_grid = (np.arange(91) / 90, np.arange(91) / 90, np.arange(181) / 180)
+    trial_grid = (np.arange(46) / 45, np.arange(46) / 45, np.arange(61) / 60)
     hold_order = (0, 1, 2)
 
     def to_parameters(self, wi: Floats, wo: Floats) -> Floats:
@@ -109,6 +115,8 @@ class HalfDiff(Chart):
     degenerate_faces = (DegenerateFace(axis=0, along=2, layers=2), DegenerateFace(axis=1, along=2, layers=1))
     reciprocal = True
     grid = (np.arange(91) / 90, np.arange(91) / 90, np.arange(91) / 90)
+    fitting_grid = (np.arange(91) / 90, np.arange(91) / 90, np.arange(61) / 60)
+    trial_grid = (np.arange(91) / 90, np.arange(91) / 90, np.arange(19) / 18)
     hold_order = (1, 0, 2)
 
     def to_parameters(self, wi: Floats, wo: Floats) -> Floats:
@@ -158,6 +166,7 @@ class Rusinkiewicz(Chart):
         self.name, self.period = name, period
         self.reciprocal = bins == 180
         self.grid = (np.arange(90) / 90, np.arange(90) / 90, np.arange(bins) / bins)
+        self.fitting_grid = self.trial_grid = self.grid
 
     def to_parameters(self, wi: Floats, wo: Floats) -> Floats:
         from bvbedit.brdf import chart_kernels

@@ -28,6 +28,10 @@ class Encoding(ABC):
     def decode(self, y: Floats) -> Floats:
         """Return f >= 0 for encoded ``y`` (any shape); negative ``y`` counts as zero."""
 
+    @abstractmethod
+    def slope(self, y: Floats) -> Floats:
+        """Return df/dy >= 0 at encoded ``y`` (any shape); negative ``y`` counts as zero."""
+
     def to_dict(self) -> dict[str, Any]:
         """Return the name and the parameters, as JSON can hold them."""
         return {"name": self.name, **vars(self)}
@@ -44,6 +48,9 @@ class Linear(Encoding):
 
     def decode(self, y: Floats) -> Floats:
         return np.maximum(y, 0.0)
+
+    def slope(self, y: Floats) -> Floats:
+        return np.ones_like(y)
 
 
 @dataclass(frozen=True)
@@ -64,6 +71,10 @@ class Root(Encoding):
         y = np.clip(y, 0.0, LARGEST ** (1 / self.k))
         return y * y * y if self.k == 3 else y**self.k
 
+    def slope(self, y: Floats) -> Floats:
+        y = np.clip(y, 0.0, LARGEST ** (1 / self.k))
+        return 3.0 * y * y if self.k == 3 else self.k * y ** (self.k - 1)
+
 
 @dataclass(frozen=True)
 class Log(Encoding):
@@ -80,6 +91,9 @@ class Log(Encoding):
 
     def decode(self, y: Floats) -> Floats:
         return self.eps * np.expm1(np.clip(y, 0.0, np.log1p(LARGEST / self.eps)))
+
+    def slope(self, y: Floats) -> Floats:
+        return self.eps * np.exp(np.clip(y, 0.0, np.log1p(LARGEST / self.eps)))
 
 
 def _checked(encoding: str, name: str, value: float, lowest: float, highest: float) -> float:

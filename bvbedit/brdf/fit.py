@@ -1,47 +1,37 @@
-"""Fitting a B-spline volume to any BRDF: sample it on the chart's grid, encode, solve least squares."""
+"""Fitting a B-spline volume to any BRDF: a plan, a net by weighted least squares, and a few steps on the metric itself."""
 
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
 from bvbedit.brdf.base import Brdf
-from bvbedit.brdf.charts import IN_OUT, Chart, grid_points
+from bvbedit.brdf.charts import IN_OUT, Chart
 from bvbedit.brdf.encodings import Encoding, Linear
-from bvbedit.brdf.geometry import Bools, Floats
-from bvbedit.brdf.measured import MeasuredBrdf, hold
+from bvbedit.brdf.geometry import Floats
+from bvbedit.brdf.losses import loss_named
+from bvbedit.brdf.plan import Plan, checked_placement, plan, try_charts
+from bvbedit.brdf.polish import polish
+from bvbedit.brdf.problem import Problem, Table, Weights, pose, tabulate
+from bvbedit.brdf.samples import draw_samples, samples_for
 from bvbedit.brdf.spline_brdf import SplineBrdf, check_fitting_chart, keep_faces
 from bvbedit.errors import BvbError
+from bvbedit.spline.adaptive import AxisLines, axis_lines
 from bvbedit.spline.arguments import one_per_axis, shown
 from bvbedit.spline.fitting import FitResult, fit_weighted, loft
-from bvbedit.spline.knots import place_knots
-
-# The horizon itself, where reflectance need not exist, is looked at from this far above (radians).
-HORIZON_MARGIN = 1e-4
-# Larger values are artefacts of dividing by a vanishing cosine.
-LARGEST_REFLECTANCE = 1e5
-# What a node without data weighs, its value held from the nearest node with data. Left free, 48 KiB models of six
-# measurements rose beyond 85 degrees to 35 ... 5e6 times the held value, and glittered; so they stay within 3.6 ... 220
-# times, while log_cosine_rms rises by 0 ... 1 % on `grid` and 0 ... 11 % on `nodes` (1e-2: 0 ... 23 %).
-HELD_WEIGHT = 1e-3
+from bvbedit.spline.knots import checked_knots, place_knots
+from bvbedit.spline.tensor import TensorSpline
 
 Progress = Callable[[float], None]
 
-
-@dataclass(frozen=True)
-class Samples:
-    """Reflectance on a grid of a chart."""
-
-    axes: tuple[Floats, Floats, Floats]
-    values: Floats
-    """(m_0, m_1, m_2, 3) encoded means over the symmetric partners that were measured."""
-    weights: Floats
-    """(m_0, m_1, m_2): the share of the symmetric partners that were measured."""
-    clamped: float
-    """The share of measured values that were negative and count as zero."""
+# Conjugate gradient steps on the grid: they unite lofting with the weights and the degenerate faces. The steps on the
+# metric's samples do the rest.
+GRID_STEPS = 8
+# Gauss-Newton steps on the metric's samples, and those of a thorough fit.
+ROUNDS = 1
+THOROUGH_ROUNDS = 4
 
 
 def fit_net(
@@ -51,16 +41,19 @@ def fit_net(
     *,
     size: Sequence[int],
     degrees: Sequence[int] = (3, 3, 3),
-    knots: str = "averaged",
+    knots: str = "dominant",
+    metric: str = "log_cosine_rms",
+    weights: Weights | None = None,
     progress: Progress | None = None,
 ) -> SplineBrdf:
     """Return the B-spline volume of ``size`` control points that approximates ``brdf``, with a report.
 
     Directions that are one pair in the chart (its folds) are averaged. What stands in cells without data has no
-    influence: there the value held from the nearest cell with data asks for ``HELD_WEIGHT`` of a cell's weight, so that
-    the model has no freedom to run wild. The control points of degenerate faces are kept equal. The published
-    configuration alone (``in-out``, ``linear``, ``piegl-tiller``) is lofted to the filled table with equal weights and
-    free faces (Lee & Park 2008). Raises BvbError where size and degrees do not suit each other or the data.
+    influence: there the value held from the nearest cell with data asks for a small weight, so that the model has no
+    freedom to run wild. The control points of degenerate faces are kept equal. ``weights`` (n, 3) -> (n,) of chart
+    parameters multiplies the weights that the metric asks for. The published configuration alone (``in-out``,
+    ``linear``, ``piegl-tiller``) is lofted to the filled table with equal weights and free faces (Lee & Park 2008).
+    Raises BvbError where size and degrees do not suit each other or the data.
     """
     check_fitting_chart(chart)
     size, degrees = one_per_axis(size, "Size"), one_per_axis(degrees, "Degrees")
@@ -69,14 +62,29 @@ def fit_net(
             f"Size {shown(size)} and degrees {shown(degrees)} are not three numbers each. Give one for each axis."
         )
     start = perf_counter()
-    published = chart is IN_OUT and isinstance(encoding, Linear) and knots == "piegl-tiller"
-    samples = sample(brdf, chart, encoding, partners=not published)
-    vectors = [place_knots(knots, u, n, p) for u, n, p in zip(samples.axes, size, degrees, strict=True)]
-    if published:
-        model = _reported(loft(samples.values, samples.axes, vectors, degrees), samples, chart, encoding, "lofting")
-    else:
-        model = _constrained(samples, chart, encoding, vectors, degrees, progress)
-    return model.told(knots=knots, seconds=perf_counter() - start)
+    if is_published(chart, encoding, knots):
+        return _published(brdf, encoding, size, degrees).told(seconds=perf_counter() - start)
+    loss = loss_named(metric)
+    points = int(np.prod([int(n) for n in size]))
+    (trial,) = try_charts(brdf, [chart], [encoding], loss, degrees=degrees, points=points, weights=weights)
+    made = plan(
+        tabulate(brdf, chart),
+        encoding,
+        loss,
+        trial.balance,
+        degrees=degrees,
+        placement=checked_placement(knots),
+        points=max(size) ** 3,
+        weights=weights,
+    )
+    return settle(brdf, made, size, weights=weights, progress=progress).told(
+        knots=knots, seconds=perf_counter() - start
+    )
+
+
+def is_published(chart: Chart, encoding: Encoding, knots: str) -> bool:
+    """Return whether this is the configuration of Lee & Park (2008)."""
+    return chart is IN_OUT and isinstance(encoding, Linear) and knots == "piegl-tiller"
 
 
 def fit_over(
@@ -86,6 +94,7 @@ def fit_over(
     knots: Sequence[Floats],
     degrees: Sequence[int],
     *,
+    metric: str = "log_cosine_rms",
     progress: Progress | None = None,
 ) -> SplineBrdf:
     """Return the B-spline volume over given full knot vectors that approximates ``brdf``, as ``fit_net`` does.
@@ -94,105 +103,102 @@ def fit_over(
     """
     check_fitting_chart(chart)
     start = perf_counter()
-    model = _constrained(sample(brdf, chart, encoding), chart, encoding, knots, degrees, progress)
+    loss = loss_named(metric)
+    vectors = tuple(checked_knots(t, p) for t, p in zip(knots, degrees, strict=True))
+    points = int(np.prod([len(t) - p - 1 for t, p in zip(vectors, degrees, strict=True)]))
+    (trial,) = try_charts(brdf, [chart], [encoding], loss, degrees=degrees, points=points)
+    problem = pose(tabulate(brdf, chart), encoding, loss, trial.balance)
+    lines = axis_lines(problem.values, problem.weights, problem.table.axes)
+    model = _settle_over(brdf, problem, lines, vectors, degrees, progress=progress)
     return model.told(knots="given", seconds=perf_counter() - start)
 
 
-def _constrained(
-    samples: Samples,
-    chart: Chart,
-    encoding: Encoding,
+def settle(
+    brdf: Brdf,
+    made: Plan,
+    size: Sequence[int],
+    *,
+    weights: Weights | None = None,
+    rounds: int = ROUNDS,
+    progress: Progress | None = None,
+) -> SplineBrdf:
+    """Return the model of ``size`` control points that a plan leads to, with a report."""
+    return _settle_over(
+        brdf,
+        made.problem,
+        made.lines,
+        made.knots(size),
+        made.degrees,
+        weights=weights,
+        rounds=rounds,
+        progress=progress,
+    )
+
+
+def _settle_over(
+    brdf: Brdf,
+    problem: Problem,
+    lines: tuple[AxisLines, ...],
     knots: Sequence[Floats],
     degrees: Sequence[int],
-    progress: Progress | None,
+    *,
+    weights: Weights | None = None,
+    rounds: int = ROUNDS,
+    progress: Progress | None = None,
 ) -> SplineBrdf:
-    """Fit with weights and with equal control points on degenerate faces."""
-    values = hold(samples.values, samples.weights > 0, chart.hold_order)
-    first = loft(values, samples.axes, knots, degrees)
+    """Return the model over given full knot vectors: on the grid, then on the metric's own samples."""
+    axes, chart = problem.table.axes, problem.chart
+
+    def project(control: Floats) -> Floats:
+        return keep_faces(control, chart)
+
+    def report(share: float) -> None:
+        if progress is not None:
+            progress(share)
+
+    first = loft(problem.values, axes, knots, degrees, [x.roots**2 for x in lines])
     result = fit_weighted(
-        values,
-        np.where(samples.weights > 0, samples.weights, HELD_WEIGHT),
-        samples.axes,
+        problem.values,
+        problem.weights,
+        axes,
         knots,
         degrees,
         start=first.spline.control,
-        project=lambda control: keep_faces(control, chart),
-        progress=progress,
+        project=project,
+        max_iterations=GRID_STEPS,
+        progress=lambda share: report(share / (1 + rounds)),
     )
-    return _reported(result, samples, chart, encoding, "weighted")
+    samples = draw_samples(brdf, chart, samples_for(result.spline.control.size // 3), weights=weights)
+    spline = polish(
+        result.spline,
+        lines,
+        samples,
+        problem.encoding,
+        problem.loss,
+        project=project,
+        rounds=rounds,
+        progress=lambda share: report((1 + rounds * share) / (1 + rounds)),
+    )
+    return _reported(first, spline, problem.table, problem.encoding, "metric").told(metric=problem.loss.name)
 
 
-def _reported(result: FitResult, samples: Samples, chart: Chart, encoding: Encoding, solver: str) -> SplineBrdf:
+def _published(brdf: Brdf, encoding: Encoding, size: Sequence[int], degrees: Sequence[int]) -> SplineBrdf:
+    """Return the fit of Lee & Park (2008): the paper's grid, one side, equal weights, free faces."""
+    table = tabulate(brdf, IN_OUT, IN_OUT.grid, mirrored=False)
+    values = encoding.encode(table.sides[0])
+    vectors = [place_knots("piegl-tiller", u, n, p) for u, n, p in zip(table.axes, size, degrees, strict=True)]
+    result = loft(values, table.axes, vectors, degrees)
+    return _reported(result, result.spline, table, encoding, "lofting").told(knots="piegl-tiller")
+
+
+def _reported(result: FitResult, spline: TensorSpline, table: Table, encoding: Encoding, solver: str) -> SplineBrdf:
+    known = np.any(np.stack(table.trusted), axis=0)
     report: dict[str, Any] = {
         "solver": solver,
-        "grid": [len(u) for u in samples.axes],
-        "without_data": float(np.mean(samples.weights == 0)),
-        "clamped": samples.clamped,
+        "grid": [len(u) for u in table.axes],
+        "without_data": float(1 - known.mean()),
+        "clamped": table.clamped,
         "condition": [min(c, sys.float_info.max) for c in result.conditions],
-        "iterations": result.iterations,
-        "residual": result.residual,
         "notes": list(result.notes),
     }
-    return SplineBrdf(result.spline, chart, encoding, report)
-
-
-def sample(brdf: Brdf, chart: Chart, encoding: Encoding, *, partners: bool = True) -> Samples:
-    """Return ``brdf`` on the grid of ``chart``, encoded.
-
-    A measurement on that very chart is taken at its own nodes. Otherwise each node is the mean over the pairs that
-    the chart cannot tell apart: the mirror image, and the exchange of wi and wo where the chart folds it but the BRDF
-    does not. Without ``partners`` only the pair that ``chart.to_directions`` names is looked up.
-    Raises BvbError where not one node has data behind it.
-    """
-    if isinstance(brdf, MeasuredBrdf) and brdf.chart is chart:
-        weights = brdf.valid & _reliable(brdf, chart)
-        values = encoding.encode(np.minimum(brdf.filled, LARGEST_REFLECTANCE))
-        return _checked(Samples(brdf.axes, values, weights.astype(np.float64), brdf.clamped))
-    wi, wo = chart.to_directions(grid_points(chart.grid))
-    # A pair that is lifted off the horizon is another pair: it fills the node, and carries no weight.
-    unmoved = np.minimum(wi[:, 2], wo[:, 2]) >= np.sin(HORIZON_MARGIN)
-    wi, wo = _off_horizon(wi), _off_horizon(wo)
-    shape = tuple(len(u) for u in chart.grid)
-    clamped = brdf.clamped if isinstance(brdf, MeasuredBrdf) else 0.0
-    pairs = [(wi, wo)]
-    if partners:
-        mirror = np.array([1.0, -1.0, 1.0])
-        pairs.append((wi * mirror, wo * mirror))
-        if chart.reciprocal and not brdf.reciprocal:
-            pairs += [(o, i) for i, o in pairs]
-    values, count = np.zeros((len(wi), 3)), np.zeros(len(wi))
-    for i, o in pairs:
-        f, trusted = brdf.evaluate_unit(i, o)
-        y = encoding.encode(np.minimum(f, LARGEST_REFLECTANCE, out=f))
-        if partners:
-            trusted &= unmoved
-            y[~trusted] = 0.0
-        values += y
-        count += trusted
-    if partners:
-        values /= np.maximum(count, 1.0)[:, None]
-    return _checked(Samples(chart.grid, values.reshape(*shape, 3), (count / len(pairs)).reshape(shape), clamped))
-
-
-def _checked(samples: Samples) -> Samples:
-    if not samples.weights.any():
-        raise BvbError(
-            "No node of the chart has data behind it: the valid cells are too few or all near grazing. "
-            "Measure, or mark valid, more of the table."
-        )
-    return samples
-
-
-def _reliable(brdf: MeasuredBrdf, chart: Chart) -> Bools:
-    """Return which nodes of the table have both directions within the reliable elevation, (n_0, n_1, n_2)."""
-    wi, wo = chart.to_directions(grid_points(brdf.axes))
-    lowest = np.cos(brdf.reliable_elevation)
-    return np.asarray(np.minimum(wi[:, 2], wo[:, 2]) >= lowest).reshape(brdf.valid.shape)
-
-
-def _off_horizon(w: Floats) -> Floats:
-    """Return ``w`` (n, 3) with directions on the horizon lifted by ``HORIZON_MARGIN``, azimuth kept."""
-    low = w[:, 2] < np.sin(HORIZON_MARGIN)
-    w[low, :2] *= (np.cos(HORIZON_MARGIN) / np.hypot(w[low, 0], w[low, 1]))[:, None]
-    w[low, 2] = np.sin(HORIZON_MARGIN)
-    return w
+    return SplineBrdf(spline, table.chart, encoding, report)

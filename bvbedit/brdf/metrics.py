@@ -3,23 +3,18 @@
 c = cos theta_i cos theta_o; natural logarithms; plain means over samples and channels.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
-from bvbedit.brdf.base import BLOCK, Brdf
-from bvbedit.brdf.charts import RUSINKIEWICZ, Rusinkiewicz, grid_points
-from bvbedit.brdf.fit import HORIZON_MARGIN, LARGEST_REFLECTANCE
+from bvbedit.brdf.base import Brdf
 from bvbedit.brdf.geometry import Floats, spherical
-from bvbedit.brdf.measured import MeasuredBrdf
+from bvbedit.brdf.sample_sets import HIGHEST_ELEVATION, HORIZON_MARGIN, LARGEST_REFLECTANCE, MARGIN, draw, node_blocks
 from bvbedit.errors import BvbError
 from bvbedit.spline.arguments import is_whole, shown
 
-HIGHEST_ELEVATION = np.radians(80.0)
-# Nodes at 80 degrees belong to the grid: rounding must not decide.
-MARGIN = 1e-9
 # Each meets 45 degrees, and both ends of every axis of the paper's grid.
 STRIDES = (1, 3, 5, 9, 15, 45)
 
@@ -93,44 +88,61 @@ def compare(a: Brdf, b: Brdf, *, stride: int = 1, progress: Callable[[float], No
     if not is_whole(stride) or stride not in STRIDES:
         raise BvbError(f"stride is {shown(stride)}. Choose one of {', '.join(map(str, STRIDES))}.")
     grid, nodes = _Sums(), _Sums()
-    theta = np.minimum(np.radians(np.arange(0.0, 91.0, stride)), np.pi / 2 - HORIZON_MARGIN)
+    theta = _elevations(stride)
+    blocks = list(node_blocks(b, stride))
+    steps = len(theta) + len(blocks)
+
+    def done(count: int) -> None:
+        if progress is not None:
+            progress(count / steps)
+
+    paper = _paper(a, b, theta, stride, grid, done)
+    for i, (wi, wo) in enumerate(blocks):
+        nodes.add(a.evaluate_unit(wi, wo)[0], b.evaluate_unit(wi, wo)[0], wi[:, 2], wo[:, 2])
+        done(len(theta) + i + 1)
+    return Comparison(grid.errors(), nodes.errors(), paper)
+
+
+def _elevations(stride: int) -> Floats:
+    return np.asarray(np.minimum(np.radians(np.arange(0.0, 91.0, stride)), np.pi / 2 - HORIZON_MARGIN))
+
+
+def _paper(
+    a: Brdf,
+    b: Brdf,
+    theta: Floats,
+    stride: int,
+    grid: _Sums | None = None,
+    done: Callable[[int], None] = lambda _: None,
+) -> PaperErrors:
+    """Return the paper's errors over its grid, and add those up to 80 degrees to ``grid``."""
     phi = np.radians(np.arange(0, 361, stride) * 0.5)
     wo = spherical(theta[:, None], phi).reshape(-1, 3)
     low_o = np.repeat(theta <= HIGHEST_ELEVATION + MARGIN, len(phi))
     distances = np.empty((len(theta), 2))
-    node_blocks = list(_node_blocks(b, stride))
-    steps = len(theta) + len(node_blocks)
     for i, wi in enumerate(spherical(theta, np.zeros(1))):
         wi_all = np.broadcast_to(wi, wo.shape)
         fa, fb = a.evaluate_unit(wi_all, wo)[0], b.evaluate_unit(wi_all, wo)[0]
         length = np.linalg.norm(np.minimum(fa, LARGEST_REFLECTANCE) - np.minimum(fb, LARGEST_REFLECTANCE), axis=1)
         distances[i] = length.max(), length.mean()
-        if theta[i] <= HIGHEST_ELEVATION + MARGIN:
+        if grid is not None and theta[i] <= HIGHEST_ELEVATION + MARGIN:
             grid.add(fa[low_o], fb[low_o], np.full(np.count_nonzero(low_o), wi[2]), wo[low_o, 2])
-        if progress is not None:
-            progress((i + 1) / steps)
-    for i, (wi, wo) in enumerate(node_blocks):
-        nodes.add(a.evaluate_unit(wi, wo)[0], b.evaluate_unit(wi, wo)[0], wi[:, 2], wo[:, 2])
-        if progress is not None:
-            progress((len(theta) + i + 1) / steps)
-    paper = PaperErrors(
+        done(i + 1)
+    return PaperErrors(
         float(distances[:, 0].max()), float(distances[:, 1].mean()), *(float(e) for e in distances[45 // stride])
     )
-    return Comparison(grid.errors(), nodes.errors(), paper)
 
 
-def _node_blocks(b: Brdf, stride: int) -> Iterator[tuple[Floats, Floats]]:
-    """Yield MERL's nodes as pairs of directions (n, 3), those that take part only."""
-    if isinstance(b, MeasuredBrdf) and isinstance(b.chart, Rusinkiewicz):
-        chart, axes, valid = b.chart, b.axes, b.valid[::stride, ::stride, ::stride]
-    else:
-        chart = RUSINKIEWICZ
-        axes = (*chart.grid[:2], chart.grid[2][::2])
-        valid = np.ones([len(x[::stride]) for x in axes], dtype=bool)
-    points = grid_points(tuple(x[::stride] for x in axes))[valid.reshape(-1)]
-    lowest = np.cos(HIGHEST_ELEVATION)
-    for start in range(0, len(points), BLOCK):
-        wi, wo = chart.to_directions(points[start : start + BLOCK])
-        keep = np.minimum(wi[:, 2], wo[:, 2]) > lowest
-        if keep.any():
-            yield wi[keep], wo[keep]
+def estimate(a: Brdf, b: Brdf, pairs: int = 50_000, seed: int = 3) -> Comparison:
+    """Return about what ``compare`` does, from so many pairs of each set drawn at random: within 1 or 2 %, in 0.1 s.
+
+    The paper's errors are those of every fifth node of each axis. ``seed`` chooses the pairs.
+    """
+    drawn = draw(b, pairs, seed)
+    fa, fb = a.evaluate_unit(drawn.wi, drawn.wo)[0], b.evaluate_unit(drawn.wi, drawn.wo)[0]
+    found = []
+    for part in drawn.parts():
+        sums = _Sums()
+        sums.add(fa[part], fb[part], drawn.wi[part, 2], drawn.wo[part, 2])
+        found.append(sums.errors())
+    return Comparison(found[0], found[1], _paper(a, b, _elevations(STRIDES[2]), STRIDES[2]))

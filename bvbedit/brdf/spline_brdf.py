@@ -10,7 +10,9 @@ from bvbedit.brdf.base import Brdf
 from bvbedit.brdf.charts import FITTING_CHARTS, Chart
 from bvbedit.brdf.encodings import Encoding
 from bvbedit.brdf.geometry import Bools, Floats
+from bvbedit.brdf.storage import FLOAT32, Storage
 from bvbedit.errors import BvbError
+from bvbedit.spline.arguments import shown
 from bvbedit.spline.tensor import TensorSpline
 
 
@@ -18,21 +20,31 @@ class SplineBrdf(Brdf):
     """A B-spline volume of encoded RGB reflectance over the unit cube of a chart.
 
     ``spline`` has three parameters on [0, 1] and three channels. ``report`` tells how the model was fitted, as JSON
-    can hold it; an edited model (``with_spline``) has none, since it would no longer be true.
-    Raises BvbError for a spline of another shape or domain, and for charts that only tables have.
+    can hold it; an edited model (``with_spline``) has none, since it would no longer be true. ``storage`` is how a file
+    holds the control points, unless another way is asked for; here they are as exact as they came.
+    Raises BvbError for a spline of another shape or domain, for charts that only tables have, and no ``Storage``.
     """
 
     reliable_elevation = float(np.pi / 2)
 
     def __init__(
-        self, spline: TensorSpline, chart: Chart, encoding: Encoding, report: Mapping[str, Any] | None = None
+        self,
+        spline: TensorSpline,
+        chart: Chart,
+        encoding: Encoding,
+        report: Mapping[str, Any] | None = None,
+        *,
+        storage: Storage = FLOAT32,
     ) -> None:
         if spline.parameters != 3 or spline.channels != 3 or spline.domain != ((0.0, 1.0),) * 3:
             raise BvbError(f"{spline!r} on {spline.domain} is no BRDF. Give 3 parameters on [0, 1] and 3 channels.")
         check_fitting_chart(chart)
+        if not isinstance(storage, Storage):
+            raise BvbError(f"{shown(storage)} is no way to store a net. Give one like Storage('float16').")
         self.spline = spline
         self.chart = chart
         self.encoding = encoding
+        self.storage = storage
         self.report: Mapping[str, Any] = MappingProxyType(dict(report or {}))
 
     def __repr__(self) -> str:
@@ -44,12 +56,16 @@ class SplineBrdf(Brdf):
         return self.chart.reciprocal
 
     def with_spline(self, spline: TensorSpline) -> "SplineBrdf":
-        """Return the model with the same chart and encoding and an edited ``spline``."""
-        return SplineBrdf(spline, self.chart, self.encoding)
+        """Return the model with the same chart, encoding and storage and an edited ``spline``."""
+        return SplineBrdf(spline, self.chart, self.encoding, storage=self.storage)
+
+    def stored_as(self, storage: Storage) -> "SplineBrdf":
+        """Return the same model, for files that hold its control points in another way."""
+        return SplineBrdf(self.spline, self.chart, self.encoding, self.report, storage=storage)
 
     def told(self, **more: Any) -> "SplineBrdf":
         """Return the same model with ``more`` in its report."""
-        return SplineBrdf(self.spline, self.chart, self.encoding, {**self.report, **more})
+        return SplineBrdf(self.spline, self.chart, self.encoding, {**self.report, **more}, storage=self.storage)
 
     def _evaluate(self, wi: Floats, wo: Floats) -> tuple[Floats, Bools]:
         f = self.encoding.decode(self.spline.evaluate(self.chart.to_parameters(wi, wo)))
@@ -60,12 +76,6 @@ def check_fitting_chart(chart: Chart) -> None:
     """Raise BvbError for a chart that only tables have."""
     if chart.name not in FITTING_CHARTS:
         raise BvbError(f"Chart {chart.name!r} is for tables only. A model lives in {' or '.join(FITTING_CHARTS)}.")
-
-
-def payload_bytes(size: Sequence[int], degrees: Sequence[int], precision: str) -> int:
-    """Return the bytes of the control net in ``precision`` and of the interior knots (float64) as stored in a file."""
-    interior = sum(n - p - 1 for n, p in zip(size, degrees, strict=True))
-    return 3 * int(np.prod(size)) * np.dtype(precision).itemsize + 8 * interior
 
 
 def keep_faces(control: Floats, chart: Chart) -> Floats:

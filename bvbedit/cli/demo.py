@@ -13,7 +13,7 @@ FITS: dict[str, tuple[str, dict[str, Any]]] = {
         "the paper's configuration",
         {"chart": "in-out", "encoding": "linear", "size": (20, 20, 80), "knots": "piegl-tiller"},
     ),
-    "half-diff": ("half-diff, root, 48 KiB", {"chart": "half-diff", "encoding": "root"}),
+    "adaptive": ("adaptive, 24 KiB", {"max_bytes": 24 * 1024}),
 }
 PICTURE: dict[str, Any] = {"width": 320, "height": 320, "spp": 64}
 # Differences are made visible by a power of two, so that one pixel in a hundred is as bright as can be.
@@ -37,7 +37,6 @@ def demo(*, out: Path = Path("bvbedit-demo"), as_json: Json = False) -> None:
     from bvbedit import api
     from bvbedit.brdf.goniophotometer import measure
     from bvbedit.brdf.materials import material_named
-    from bvbedit.brdf.spline_brdf import payload_bytes
     from bvbedit.io import make_folder
     from bvbedit.io.files import replacing
 
@@ -63,7 +62,7 @@ def demo(*, out: Path = Path("bvbedit-demo"), as_json: Json = False) -> None:
             "file": file.name,
             "size": list(spline.size),
             "file_bytes": file.stat().st_size,
-            "payload_bytes": payload_bytes(spline.size, spline.degrees, "float32"),
+            "payload_bytes": models[name].storage.payload_bytes(spline.control, spline.degrees),
             "seconds": seconds,
             **api.compare(models[name], measured).to_dict(),
         }

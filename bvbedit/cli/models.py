@@ -24,17 +24,23 @@ def fit(
     target: Path,
     /,
     *,
-    chart: str = "half-diff",
-    encoding: str = "root",
+    chart: str = "auto",
+    encoding: str = "auto",
     size: Size = None,
     degree: int = 3,
-    knots: str = "averaged",
+    knots: str = "dominant",
     max_bytes: int | None = None,
     max_payload: int | None = None,
-    precision: str = "float32",
+    tolerance: float | None = None,
+    metric: str = "log_cosine_rms",
+    precision: str = "auto",
+    thorough: bool = False,
+    explain: Path | None = None,
     as_json: Json = False,
 ) -> None:
     """Fit a B-spline volume to a measured BRDF.
+
+    Without a size or a bound the net is as large as the knee of its error curve asks for.
 
     Parameters
     ----------
@@ -43,21 +49,30 @@ def fit(
     target
         The .bvb file to write.
     chart
-        half-diff (sharp highlights) or in-out (the paper's).
+        half-diff (sharp highlights), in-out (the paper's) or auto (the better one by a quick trial).
     encoding
-        root, log or linear: what is approximated.
+        root, log or linear: what is approximated; or auto.
     size
         Control points along each axis, like 20,20,80.
     degree
         Degree along every axis, 0 to 16.
     knots
-        averaged, piegl-tiller (the paper's) or uniform.
+        dominant (where the material has features), free (moved from there), averaged, piegl-tiller (the paper's) or
+        uniform.
     max_bytes
-        Largest file, in place of a size. The default is 49152.
+        Largest file, in place of a size.
     max_payload
-        Most bytes of control points and interior knots, in place of a size.
+        Most bytes of control points and interior knots as stored, in place of a size.
+    tolerance
+        Largest metric, in place of a size: the smallest net that keeps it on both sets of samples.
+    metric
+        log_cosine_rms, fores or relative_l1: what is to be small.
     precision
-        float16, float32 or float64 control points in the file.
+        quantised, float16, float32 or float64 control points in the file; auto is quantised.
+    thorough
+        Take more steps on the metric itself, and some seconds longer.
+    explain
+        A .png or .svg file to plot the error curve to: why the net has the size it has.
     as_json
         Print one JSON object.
     """
@@ -68,6 +83,8 @@ def fit(
 
     start = perf_counter()
     check_target(target, (".bvb",))
+    if explain is not None:
+        check_target(explain, (".png", ".svg"))
     brdf = api.load(source)
     with progress(f"Fitting {source.name}") as watch:
         model = api.fit(
@@ -79,11 +96,18 @@ def fit(
             knots=knots,
             max_bytes=max_bytes,
             max_payload=max_payload,
+            tolerance=tolerance,
+            metric=metric,
             precision=precision,
+            thorough=thorough,
+            source=source.name,
             progress=watch,
         )
-    model = model.told(source=source.name)
-    api.save(model, target, precision=precision)
+    api.save(model, target)
+    if explain is not None:
+        from bvbedit.cli.explanation import plot_curve
+
+        plot_curve(model, source.name, explain)
     result = describe_model(model, target)
     report({**result, "seconds": perf_counter() - start}, as_json)
 
@@ -120,24 +144,32 @@ def info(file: Path, /, *, as_json: Json = False) -> None:
 
 def describe_model(model: Any, file: Path) -> dict[str, Any]:
     """Return what ``fit`` and ``info`` tell of a saved model."""
-    from bvbedit.brdf.spline_brdf import face_spread, payload_bytes
-    from bvbedit.io.bvb import stored_precision
+    from bvbedit.brdf.spline_brdf import face_spread
 
-    spline = model.spline
-    precision = stored_precision(file)
+    spline, storage = model.spline, model.storage
     told = dict(model.report)
     return {
         "file": str(file),
         "file_bytes": file.stat().st_size,
-        "payload_bytes": payload_bytes(spline.size, spline.degrees, precision),
-        "precision": precision,
+        "payload_bytes": storage.payload_bytes(spline.control, spline.degrees),
+        "precision": storage.precision,
+        "step": storage.step,
         "chart": model.chart.name,
         "encoding": model.encoding.to_dict(),
         "degrees": list(spline.degrees),
         "size": list(spline.size),
         "face_spread": face_spread(spline.control, model.chart),
         **{k: told.get(k) for k in ("source", "knots", "condition", "seconds", "notes", "metrics")},
+        "soundness": told["soundness"] if "soundness" in told else soundness_of(model),
+        **{k: told[k] for k in ("tried", "curve") if k in told},
     }
+
+
+def soundness_of(model: Any) -> dict[str, Any]:
+    """Return what can be said of an edited model, whose measurement is not at hand."""
+    from bvbedit.brdf.soundness import soundness
+
+    return soundness(model)
 
 
 def compare(a: Path, b: Path, /, *, as_json: Json = False) -> None:

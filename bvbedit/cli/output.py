@@ -24,6 +24,9 @@ def _flatten(result: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str,
         label = f"{prefix}{name.replace('_', ' ')}"
         if isinstance(value, Mapping):
             yield from _flatten(value, f"{label}: ")
+        elif isinstance(value, list | tuple) and any(isinstance(v, Mapping) for v in value):
+            for v in value:
+                yield label, ", ".join(f"{k} {text}" for k, text in _flatten(v))
         elif isinstance(value, list | tuple):
             separator = "; " if any(isinstance(v, str) for v in value) else " x " if "size" in name else ", "
             yield label, separator.join(_text(v) for v in value) or "none"

@@ -51,8 +51,8 @@ def refine(
 
     if (at is None) == (factor is None):
         raise BvbError("Refining needs --at or --factor. Give one of them.")
-    model, precision = _opened(source, target)
-    _finish(source, target, model, structure.refine(model, axis, at=at, factor=factor), precision, as_json)
+    model = _opened(source, target)
+    _finish(source, target, model, structure.refine(model, axis, at=at, factor=factor), as_json)
 
 
 def remove(source: Path, target: Path, /, *, axis: int, tolerance: float, as_json: Json = False) -> None:
@@ -73,10 +73,10 @@ def remove(source: Path, target: Path, /, *, axis: int, tolerance: float, as_jso
     """
     from bvbedit.brdf import structure
 
-    model, precision = _opened(source, target)
+    model = _opened(source, target)
     with progress(f"Removing knots of {source.name}"):
         edited, _ = structure.remove(model, axis, tolerance)
-    _finish(source, target, model, edited, precision, as_json)
+    _finish(source, target, model, edited, as_json)
 
 
 def elevate(source: Path, target: Path, /, *, axis: int, by: int = 1, as_json: Json = False) -> None:
@@ -97,8 +97,8 @@ def elevate(source: Path, target: Path, /, *, axis: int, by: int = 1, as_json: J
     """
     from bvbedit.brdf import structure
 
-    model, precision = _opened(source, target)
-    _finish(source, target, model, structure.elevate(model, axis, by), precision, as_json)
+    model = _opened(source, target)
+    _finish(source, target, model, structure.elevate(model, axis, by), as_json)
 
 
 def reduce(
@@ -123,9 +123,9 @@ def reduce(
     """
     from bvbedit.brdf import structure
 
-    model, precision = _opened(source, target)
+    model = _opened(source, target)
     edited, _ = structure.reduce(model, axis, by, tolerance)
-    _finish(source, target, model, edited, precision, as_json)
+    _finish(source, target, model, edited, as_json)
 
 
 def blend(a: Path, b: Path, target: Path, /, *, t: Numbers, space: str = "net", as_json: Json = False) -> None:
@@ -148,37 +148,35 @@ def blend(a: Path, b: Path, target: Path, /, *, t: Numbers, space: str = "net", 
     """
     from bvbedit import api
 
-    first, precision = _opened(a, target)
-    second, _ = _opened(b, target)
+    first = _opened(a, target)
+    second = _opened(b, target)
     with progress(f"Blending {a.name} with {b.name}") as watch:
         mixed = api.blend(first, second, t[0] if len(t) == 1 else t, space, progress=watch)
-    _finish(a, target, first, mixed.told(source=f"{a.name}, {b.name}"), precision, as_json)
+    _finish(a, target, first, mixed.told(source=f"{a.name}, {b.name}"), as_json)
 
 
-def _opened(source: Path, target: Path) -> tuple[Any, str]:
-    """Return the model in ``source`` and its precision, once it is known that ``target`` can be written."""
+def _opened(source: Path, target: Path) -> Any:
+    """Return the model in ``source``, once it is known that ``target`` can be written."""
     from bvbedit.brdf.spline_brdf import SplineBrdf
     from bvbedit.errors import BvbError
     from bvbedit.io import check_target, load
-    from bvbedit.io.bvb import stored_precision
 
     check_target(target, (".bvb",))
     model = load(source)
     if not isinstance(model, SplineBrdf):
         raise BvbError(f"{source} is a measurement, not a model. Fit it first: bvbedit fit {source} {source.stem}.bvb")
-    return model, stored_precision(source)
+    return model
 
 
-def _finish(source: Path, target: Path, before: Any, after: Any, precision: str, as_json: bool) -> None:
-    """Save the edited model and tell what changed, rounding to the file's precision included."""
+def _finish(source: Path, target: Path, before: Any, after: Any, as_json: bool) -> None:
+    """Save the edited model as the first was stored and tell what changed, what the storage rounds off included."""
     from bvbedit.brdf.structure import largest_change
     from bvbedit.io import save
-    from bvbedit.io.bvb import dumps, loads
 
     bytes_before = source.stat().st_size
-    stored = loads(dumps(after, precision), str(target))
-    change = largest_change(before, stored)
-    save(after, target, precision=precision)
+    spline, storage = after.spline, before.storage
+    change = largest_change(before, after.with_spline(spline.with_control(storage.rounded(spline.control))))
+    save(after.stored_as(storage), target)
     result: dict[str, Any] = {
         "file": str(target),
         "size_before": list(before.spline.size),

@@ -39,11 +39,12 @@ def load(path: str | os.PathLike[str]) -> Brdf:
     raise BvbError(f"{path} is neither MERL, RGL, .bvb nor .npz. Name a file in one of these formats.")
 
 
-def save(model: Brdf, path: str | os.PathLike[str], *, precision: str = "float32") -> None:
+def save(model: Brdf, path: str | os.PathLike[str], *, precision: str | None = None) -> None:
     """Write ``model`` to ``path``: a SplineBrdf as .bvb, a MeasuredBrdf as .binary (on MERL's nodes) or .npz.
 
-    ``precision`` (float16, float32 or float64) is that of the control points in a .bvb file. The file is written
-    beside its target and moved into place. Raises BvbError for another suffix, and where it cannot be written.
+    ``precision`` (float16, float32, float64 or quantised) is that of the control points in a .bvb file, in place of the
+    model's own storage; quantised, unless that says how, to 2**-12 of the largest. The file is written beside its
+    target and moved into place. Raises BvbError for another suffix, and where it cannot be written.
     """
     suffix = as_path(path).suffix.lower()
     if isinstance(model, SplineBrdf):

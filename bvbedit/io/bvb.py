@@ -3,22 +3,21 @@
 import io
 import json
 import os
+from collections.abc import Sequence
 from typing import Any
-
-import numpy as np
 
 from bvbedit.brdf.charts import chart_named
 from bvbedit.brdf.encodings import encoding_from_dict
 from bvbedit.brdf.spline_brdf import SplineBrdf
+from bvbedit.brdf.storage import MOST_PLANES, Storage, storage_named, unpacked
 from bvbedit.errors import BvbError
-from bvbedit.io.archive import Archive, write_archive
+from bvbedit.io.archive import Archive, Array, write_archive
 from bvbedit.io.files import reading, replacing
 from bvbedit.spline.arguments import shown
 from bvbedit.spline.tensor import TensorSpline
 
 FORMAT = "bvbedit"
 VERSION = 1
-PRECISIONS = ("float16", "float32", "float64")
 META = "meta.json"
 
 # Limits far above any net that makes sense and far below what would hurt; in bytes ...
@@ -29,24 +28,25 @@ MOST_KNOTS = 1 << 18
 MOST_CONTROL = 1 << 24
 
 
-def dumps(model: SplineBrdf, precision: str = "float32") -> bytes:
+def dumps(model: SplineBrdf, precision: str | None = None) -> bytes:
     """Return ``model`` as the bytes of a .bvb file, its control points rounded to ``precision``.
 
-    Raises BvbError for an unknown precision, control points that it cannot hold, a report that is no JSON, and more
-    of anything than ``loads`` would take.
+    That is one of ``PRECISIONS``, or the model's own storage; "quantised", where that has no step, takes 2**-12 of the
+    largest |control point|. Raises BvbError for an unknown precision, control points that it cannot hold, a report
+    that is no JSON, and more of anything than ``loads`` would take.
     """
-    if precision not in PRECISIONS:
-        raise BvbError(f"Unknown precision {precision!r}. Choose one of {', '.join(PRECISIONS)}.")
     control = model.spline.control
-    largest = float(np.abs(control).max())
-    if largest > float(np.finfo(precision).max):
-        raise BvbError(f"A control point of {largest:g} does not fit into {precision}. Save in a higher precision.")
+    storage = model.storage
+    if precision is not None and precision != storage.precision:
+        storage = storage_named(precision, control)
+    array, axes = storage.packed(control)
     meta = {
         "format": FORMAT,
         "version": VERSION,
         "chart": model.chart.name,
         "encoding": model.encoding.to_dict(),
         "degrees": list(model.spline.degrees),
+        "storage": _described(storage, axes),
         "report": dict(model.report),
     }
     try:
@@ -60,10 +60,15 @@ def dumps(model: SplineBrdf, precision: str = "float32") -> bytes:
             f"much for a file. Keep within {MOST_CONTROL:,}, {MOST_KNOTS:,} and {LARGEST_META:,}."
         )
     arrays = {f"knots_{axis}": knots for axis, knots in enumerate(model.spline.knots)}
-    arrays["control"] = control.astype(precision)
     stream = io.BytesIO()
-    write_archive(stream, arrays, {META: text}, level=9)
+    write_archive(stream, {**arrays, "control": array}, {META: text}, level=9)
     return stream.getvalue()
+
+
+def _described(storage: Storage, axes: Sequence[int]) -> dict[str, Any]:
+    if storage.step is None:
+        return {"precision": storage.precision}
+    return {"precision": storage.precision, "step": storage.step, "differences": list(axes)}
 
 
 def loads(content: bytes, name: str = "model") -> SplineBrdf:
@@ -83,31 +88,60 @@ def loads(content: bytes, name: str = "model") -> SplineBrdf:
             f"{name} has format version {shown(version)}; this bvbedit reads up to {VERSION}. Update bvbedit."
         )
     try:
-        degrees = _whole_numbers(meta.get("degrees"))
+        degrees = _whole_numbers(meta.get("degrees"), "degrees")
+        if len(degrees) != 3:
+            raise BvbError(f"{len(degrees)} degrees given: a BRDF has three parameters.")
         knots = [archive.array(f"knots_{a}", ("float64",), 1, MOST_KNOTS) for a in range(len(degrees))]
-        control = archive.array("control", PRECISIONS, len(degrees) + 1, MOST_CONTROL)
-        spline = TensorSpline(degrees, knots, control)
+        storage, axes = _storage(meta.get("storage"))
+        size = tuple(len(t) - p - 1 for t, p in zip(knots, degrees, strict=True))
+        spline = TensorSpline(degrees, knots, unpacked(_net(archive, storage, size), storage, axes))
         encoding = meta.get("encoding")
         report = meta.get("report", {})
         if not isinstance(encoding, dict) or not isinstance(report, dict):
             raise BvbError("encoding and report must be objects.")
-        return SplineBrdf(spline, chart_named(meta.get("chart", "")), encoding_from_dict(encoding), report)
+        return SplineBrdf(
+            spline, chart_named(meta.get("chart", "")), encoding_from_dict(encoding), report, storage=storage
+        )
     except BvbError as error:
         if str(error).startswith(name):
             raise
         raise BvbError(f"{name} is not a sound model: {error}") from None
 
 
-def _whole_numbers(value: Any) -> list[int]:
+def _whole_numbers(value: Any, name: str) -> list[int]:
     if not isinstance(value, list) or not all(isinstance(v, int) and not isinstance(v, bool) for v in value):
-        raise BvbError(f"degrees are {shown(value)}, not a list of whole numbers.")
-    if len(value) != 3:
-        raise BvbError(f"{len(value)} degrees given: a BRDF has three parameters.")
+        raise BvbError(f"{name} are {shown(value)}, not a list of whole numbers.")
     return value
 
 
-def save_bvb(model: SplineBrdf, path: str | os.PathLike[str], precision: str = "float32") -> None:
-    """Write ``model`` to ``path``. Raises BvbError as ``dumps`` does, or where the file cannot be written."""
+def _storage(value: Any) -> tuple[Storage, list[int]]:
+    """Return the storage that meta.json describes, and the axes along which differences were taken."""
+    if not isinstance(value, dict):
+        raise BvbError(f"storage is {shown(value)}, not an object.")
+    storage = Storage(value.get("precision", ""), value.get("step"))
+    axes = _whole_numbers(value.get("differences", []), "differences")
+    if value != _described(storage, axes):
+        raise BvbError(f"storage is {shown(value)}, with entries missing or unknown.")
+    return storage, axes
+
+
+def _net(archive: Archive, storage: Storage, size: tuple[int, ...]) -> Array:
+    """Return the member ``control``: of the storage's type, within limits; of planes the shape is right as well."""
+    if storage.step is None:
+        return archive.array("control", (storage.precision,), len(size) + 1, MOST_CONTROL)
+    planes = archive.array("control", ("uint8",), len(size) + 2, MOST_PLANES * MOST_CONTROL)
+    if planes.shape[1:] != (3, *size):
+        raise BvbError(f"its planes have shape {shown(planes.shape)}, its knots and degrees ask for size {size}.")
+    if planes[0].size > MOST_CONTROL:
+        raise BvbError(f"control has {planes[0].size:,} entries, more than the {MOST_CONTROL:,} allowed.")
+    return planes
+
+
+def save_bvb(model: SplineBrdf, path: str | os.PathLike[str], precision: str | None = None) -> None:
+    """Write ``model`` to ``path``, in its own storage or as ``precision`` says.
+
+    Raises BvbError as ``dumps`` does, or where the file cannot be written.
+    """
     content = dumps(model, precision)
     with replacing(path) as stream:
         stream.write(content)
@@ -116,12 +150,6 @@ def save_bvb(model: SplineBrdf, path: str | os.PathLike[str], precision: str = "
 def load_bvb(path: str | os.PathLike[str]) -> SplineBrdf:
     """Return the model in the file ``path``. Raises BvbError as ``loads`` does, or where it cannot be read."""
     return loads(_content(path), str(path))
-
-
-def stored_precision(path: str | os.PathLike[str]) -> str:
-    """Return the precision in which the file ``path`` holds its control points."""
-    archive = Archive(io.BytesIO(_content(path)), str(path))
-    return str(archive.array("control", PRECISIONS, 4, MOST_CONTROL).dtype)
 
 
 def _content(path: str | os.PathLike[str]) -> bytes:

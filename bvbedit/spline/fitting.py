@@ -5,6 +5,7 @@ the next. On a full grid with equal weights this is the tensor-product least-squ
 of a Kronecker product is the Kronecker product of the pseudo-inverses.
 """
 
+import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -39,6 +40,8 @@ class AxisFit:
     """(n, m): control points = pseudo_inverse @ data."""
     inverse_normal: Floats
     """(n, n): inverse of the (weighted, penalised) normal matrix."""
+    factor: Floats
+    """(n, n): upper triangular R, the (weighted, penalised) normal matrix being R^T R."""
     condition: float
     """Condition number of the (weighted) collocation matrix, before any penalty; the normal matrix has its square."""
     penalised: bool
@@ -82,19 +85,55 @@ def fit_axis(parameters: Floats, knots: Floats, degree: int, weights: Floats | N
         differences = np.diff(np.eye(n), min(2, n - 1), axis=0)
         q, r = np.linalg.qr(np.concatenate([rows, scale * differences]))
     inverse_r = np.linalg.solve(r, np.eye(n))
-    return AxisFit(matrix, inverse_r @ q[:m].T * root, inverse_r @ inverse_r.T, condition, penalised)
+    return AxisFit(matrix, inverse_r @ q[:m].T * root, inverse_r @ inverse_r.T, r, condition, penalised)
 
 
-def loft(values: Floats, parameters: Sequence[Floats], knots: Sequence[Floats], degrees: Sequence[int]) -> FitResult:
-    """Return the least-squares spline to ``values`` (m_1, ..., m_d, c) on a grid, all with equal weight.
+def marginal_axes(
+    weights: Floats, parameters: Sequence[Floats], knots: Sequence[Floats], degrees: Sequence[int]
+) -> tuple[list[AxisFit], list[Floats], float]:
+    """Return the axes' fits under the marginals of ``weights`` (m_1, ..., m_d), the marginals, and their level.
 
-    ``parameters`` are the d increasing grid axes (m_a,), ``knots`` d full clamped knot vectors over them.
+    The largest of each marginal (m_a,) is one, and none is below 1e-4; level times their product has the sum of the
+    weights, and is equal to them where they are separable and that floor is not reached.
+    """
+    marginals = []
+    for a in range(weights.ndim):
+        marginal = weights.mean(axis=tuple(b for b in range(weights.ndim) if b != a))
+        marginals.append(np.maximum(marginal / marginal.max(), MARGINAL_FLOOR))
+    axes = [fit_axis(u, t, p, w) for u, t, p, w in zip(parameters, knots, degrees, marginals, strict=True)]
+    return axes, marginals, float(weights.mean() / np.prod([w.mean() for w in marginals]))
+
+
+def diagonalised(axis: AxisFit, penalty: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return T, T^-T (n, n) and d (n,): T^T N T = 1 for the axis' normal matrix N, and T^T E^T E T = diag(d).
+
+    ``penalty`` is E (k, n). The d are squares of singular values of E R^-1: an eigenvalue problem of the products would
+    lose the small ones in rounding. Where k < n the n - k null directions have d = 0 exactly.
+    """
+    _, singular, q = np.linalg.svd(np.linalg.solve(axis.factor.T, penalty.T).T)
+    d = np.zeros(len(q))
+    d[: len(singular)] = singular**2
+    return np.linalg.solve(axis.factor, q.T), axis.factor.T @ q.T, d
+
+
+def loft(
+    values: Floats,
+    parameters: Sequence[Floats],
+    knots: Sequence[Floats],
+    degrees: Sequence[int],
+    weights: Sequence[Floats] | None = None,
+) -> FitResult:
+    """Return the least-squares spline to ``values`` (m_1, ..., m_d, c) on a grid.
+
+    ``parameters`` are the d increasing grid axes (m_a,), ``knots`` d full clamped knot vectors over them. The weight of
+    a node is the product of ``weights`` (m_a,) > 0 of its axes, or one.
     Raises BvbError where the shapes do not match, values are not finite, nodes do not increase within the knots, or an
     axis has more control points than data. Source: Lee & Park (2008), section 3.2.
     """
     values, parameters, knots, degrees = _checked_data(values, parameters, knots, degrees)
-    axes = [fit_axis(u, t, p) for u, t, p in zip(parameters, knots, degrees, strict=True)]
-    control = _along_all([a.pseudo_inverse for a in axes], values)
+    rows: Sequence[Floats | None] = [None] * len(degrees) if weights is None else weights
+    axes = [fit_axis(u, t, p, w) for u, t, p, w in zip(parameters, knots, degrees, rows, strict=True)]
+    control = along_all([a.pseudo_inverse for a in axes], values)
     return FitResult(TensorSpline(degrees, knots, control), tuple(a.condition for a in axes), _penalty_notes(axes))
 
 
@@ -107,6 +146,7 @@ def fit_weighted(
     *,
     start: Floats,
     project: Callable[[Floats], Floats] = lambda control: control,
+    penalty: Sequence[Floats] | None = None,
     tolerance: float = 1e-4,
     max_iterations: int = 200,
     progress: Callable[[float], None] | None = None,
@@ -119,30 +159,30 @@ def fit_weighted(
     W A, preconditioned by the separable inverse that the marginals of W give, until the preconditioned gradient has
     shrunk to ``tolerance`` of the right-hand side's.
 
-    Raises BvbError as ``loft`` does, for weights that are negative, not finite or all zero, another start, and a
-    tolerance outside [1e-15, 1].
+    ``penalty`` are matrices E_a (k_a, n_a). The sum to be minimised then grows by |E_a C|^2 of every line of the spline
+    along axis a through the nodes of the other axes, the lines weighed by the other marginals: with N_a the normal
+    matrix of a's marginal, by level C^T (sum_a E_a^T E_a along a, N_b along the others) C as in ``marginal_axes``.
+    So the preconditioner still is the inverse itself where the weights are separable.
+
+    Raises BvbError as ``loft`` does, for weights that are negative, not finite or all zero, another start, penalties of
+    another shape or not finite, and a tolerance outside [1e-15, 1].
     """
     values, parameters, knots, degrees = _checked_data(values, parameters, knots, degrees)
     size = tuple(len(t) - p - 1 for t, p in zip(knots, degrees, strict=True))
-    start, weights = real_array(start, "Start"), real_array(weights, "Weights")
+    start, weights = real_array(start, "Start"), _checked_weights(weights, values.shape[:-1])
     if start.shape != (*size, values.shape[-1]) or not np.isfinite(start).all():
         raise BvbError(f"The start {start.shape} is no net of size {size} with finite values. Start from a lofted net.")
-    if weights.shape != values.shape[:-1] or not np.isfinite(weights).all() or not weights.any() or weights.min() < 0:
-        raise BvbError(
-            f"Weights of shape {weights.shape} cannot weigh these data. "
-            f"Give finite weights >= 0 of shape {values.shape[:-1]}, not all zero."
-        )
     if not is_real_within(tolerance, SMALLEST_TOLERANCE, 1.0):
         raise BvbError(f"Tolerance {shown(tolerance)} cannot end a fit. Choose one in {SMALLEST_TOLERANCE:g} ... 1.")
     weights = weights / weights.max()
     d = len(degrees)
-    axes = []
-    for a in range(d):
-        marginal = weights.mean(axis=tuple(b for b in range(d) if b != a))
-        marginal = np.maximum(marginal / marginal.max(), MARGINAL_FLOOR)
-        axes.append(fit_axis(parameters[a], knots[a], degrees[a], marginal))
+    axes, _, level = marginal_axes(weights, parameters, knots, degrees)
     matrices = [a.matrix for a in axes]
     inverses = [a.inverse_normal for a in axes]
+    if penalty is not None:
+        rows = _checked_penalty(penalty, size)
+        bases, duals, diagonals = zip(*(diagonalised(a, e) for a, e in zip(axes, rows, strict=True)), strict=True)
+        damping = outer_sum(diagonals)[..., None]
 
     right = weights[..., None] * values
     # Sums and squares of extreme data leave the range of float64: the iteration works on numbers of order one.
@@ -152,11 +192,19 @@ def fit_weighted(
         right = matrices[a].apply_transposed(right, a)
     right = project(right)
 
+    def normal(x: Floats) -> Floats:
+        image = _normal(matrices, weights, x)
+        if penalty is not None:
+            image += level * along_all(duals, damping * along_all([t.T for t in duals], x))
+        return project(image)
+
     def precondition(r: Floats) -> Floats:
-        return project(_along_all(inverses, r))
+        if penalty is not None:
+            return project(along_all(bases, along_all([t.T for t in bases], r) / (1.0 + damping)))
+        return project(along_all(inverses, r))
 
     x = project(np.ldexp(start, -exponent))
-    r = right - project(_normal(matrices, weights, x))
+    r = right - normal(x)
     z = precondition(r)
     direction = z
     rz = float(np.vdot(r, z))
@@ -165,7 +213,7 @@ def fit_weighted(
     goal = tolerance**2 * scale
     first, iterations = rz, 0
     while rz > goal and iterations < max_iterations:
-        image = project(_normal(matrices, weights, direction))
+        image = normal(direction)
         alpha = rz / float(np.vdot(direction, image))
         x = x + alpha * direction
         r = r - alpha * image
@@ -205,13 +253,18 @@ def _normal(matrices: Sequence[Banded], weights: Floats, x: Floats) -> Floats:
     return out
 
 
-def _along_all(matrices: Sequence[Floats], x: Floats) -> Floats:
+def along_all(matrices: Sequence[Floats], x: Floats) -> Floats:
     """Return ``x`` with a dense matrix applied along each axis: the longest contiguous runs, axis 0, first."""
     for axis, matrix in enumerate(matrices):
         before, n = int(np.prod(x.shape[:axis])), x.shape[axis]
         out = matrix @ x.reshape(before, n, -1)
         x = out.reshape((*x.shape[:axis], len(matrix), *x.shape[axis + 1 :]))
     return x
+
+
+def outer_sum(rows: Sequence[Floats]) -> Floats:
+    """Return the array (n_1, ..., n_d) of the sums of one entry of each of the ``rows`` (n_a,)."""
+    return functools.reduce(np.add.outer, rows)
 
 
 def _penalty_notes(axes: Sequence[AxisFit]) -> tuple[str, ...]:
@@ -221,6 +274,28 @@ def _penalty_notes(axes: Sequence[AxisFit]) -> tuple[str, ...]:
         for i, a in enumerate(axes)
         if a.penalised
     )
+
+
+def _checked_weights(weights: object, shape: tuple[int, ...]) -> Floats:
+    """Return the weights of data on a grid of the given ``shape`` as an array."""
+    out = real_array(weights, "Weights")
+    if out.shape != shape or not np.isfinite(out).all() or not out.any() or out.min() < 0:
+        raise BvbError(
+            f"Weights of shape {out.shape} cannot weigh these data. "
+            f"Give finite weights >= 0 of shape {shape}, not all zero."
+        )
+    return out
+
+
+def _checked_penalty(penalty: object, size: tuple[int, ...]) -> list[Floats]:
+    """Return the penalties of the axes as arrays that suit a net of that ``size``."""
+    rows = [real_array(e, "Penalties") for e in one_per_axis(penalty, "Penalties")]
+    if [e.shape[1:] for e in rows] != [(n,) for n in size] or not all(np.isfinite(e).all() for e in rows):
+        raise BvbError(
+            f"Penalties of shapes {[e.shape for e in rows]} do not suit a net of size {size}. "
+            "Give a finite matrix (k_a, n_a) for each axis."
+        )
+    return rows
 
 
 def _checked_data(

@@ -9,6 +9,7 @@ from bvbedit import BvbError
 from bvbedit.brdf.charts import HALF_DIFF, IN_OUT, RUSINKIEWICZ, Chart
 from bvbedit.brdf.encodings import Encoding, Linear, Log, Root
 from bvbedit.brdf.spline_brdf import SplineBrdf, face_spread, keep_faces, payload_bytes
+from bvbedit.brdf.storage import Storage
 from bvbedit.spline.knots import clamped
 from bvbedit.spline.tensor import TensorSpline
 from tests.brdf.samples import random_pairs
@@ -63,6 +64,21 @@ def test_what_is_no_brdf_is_refused(rng):
 def test_the_payload_is_the_net_and_the_interior_knots(precision, item):
     assert payload_bytes((10, 6, 4), (3, 3, 3), precision) == 10 * 6 * 4 * 3 * item + (6 + 2) * 8
     assert payload_bytes((4, 2, 1), (3, 1, 0), precision) == 4 * 2 * 3 * item
+    with pytest.raises(BvbError, match="quantised net has no bytes before it is fitted"):
+        payload_bytes((10, 6, 4), (3, 3, 3), "quantised")
+
+
+def test_a_model_is_stored_in_one_way_however_it_is_edited(rng):
+    model = SplineBrdf(_spline(rng), HALF_DIFF, Root(), {"metrics": {}})
+    assert model.storage == Storage("float32")
+    coarse = model.stored_as(Storage("quantised", 0.01))
+    assert (model.storage, coarse.storage) == (Storage(), Storage("quantised", 0.01))
+    assert coarse.spline is model.spline
+    assert (coarse.chart, coarse.encoding, dict(coarse.report)) == (model.chart, model.encoding, dict(model.report))
+    assert coarse.told(source="a").storage == coarse.storage
+    assert coarse.with_spline(coarse.spline.elevate(0)).storage == coarse.storage
+    with pytest.raises(BvbError, match="'float16' is no way to store a net"):
+        model.stored_as("float16")  # type: ignore[arg-type]
 
 
 def test_an_edited_model_has_no_report_and_the_first_keeps_its_own(rng):

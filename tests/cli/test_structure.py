@@ -8,7 +8,7 @@ import pytest
 import bvbedit
 from bvbedit.brdf.analytic import Lambert
 from bvbedit.brdf.spline_brdf import face_spread
-from bvbedit.io.bvb import stored_precision
+from bvbedit.brdf.storage import Storage
 
 KEYS = ["file", "size_before", "size_after", "bytes_before", "bytes_after", "max_change"]
 EDITS = {
@@ -47,12 +47,37 @@ def test_an_edit_writes_a_model_and_tells_what_changed(command, arguments, run, 
     assert face_spread(after.spline.control, after.chart) == 0
 
 
-def test_the_precision_of_the_file_is_kept(run, folder, tmp_path):
+@pytest.mark.parametrize("storage", [Storage("float16"), Storage("float64"), Storage("quantised", 0.003)], ids=repr)
+def test_the_storage_of_the_file_is_kept_and_its_rounding_told(storage, run, folder, grey, tmp_path, rng):
+    source, target = tmp_path / "in.bvb", tmp_path / "out.bvb"
+    bvbedit.save(bvbedit.load(folder / "satin.bvb").stored_as(storage), source)
+    before = bvbedit.load(source)
+    assert before.storage == storage
+    told = json.loads(run("refine", source, target, "--axis", "0", "--factor", "2", "--json")[1])
+    after = bvbedit.load(target)
+    assert after.storage == storage
+    exact = before.spline.refine(0, 2).control
+    largest = np.abs(after.spline.control - exact).max()
+    assert told["max_change"] == pytest.approx(largest, abs=1e-14)
+    x = rng.uniform(0, 1, (3000, 3))
+    change = np.abs(after.spline.evaluate(x) - before.spline.evaluate(x)).max()
+    assert change <= told["max_change"] + 1e-14
+    if storage.step is not None:
+        assert 0.001 < told["max_change"] <= 0.0015 + 1e-12
+    for space in ("net", "linear"):
+        assert run("blend", source, grey, target, "--t", "0.5", "--space", space)[0] == 0
+        assert bvbedit.load(target).storage == storage
+
+
+def test_an_edit_beyond_the_storage_of_the_file_is_refused(run, folder, tmp_path):
+    source, target = tmp_path / "in.bvb", tmp_path / "out.bvb"
     model = bvbedit.load(folder / "satin.bvb")
-    for precision in ("float16", "float64"):
-        bvbedit.save(model, tmp_path / "in.bvb", precision=precision)
-        assert run("elevate", tmp_path / "in.bvb", tmp_path / "out.bvb", "--axis", "0")[0] == 0
-        assert stored_precision(tmp_path / "out.bvb") == precision
+    one = model.with_spline(model.spline.with_control(model.spline.control / np.abs(model.spline.control).max()))
+    bvbedit.save(one.stored_as(Storage("quantised", 1.0 / (2**31 - 1))), source)
+    status, out, err = run("blend", source, folder / "satin.bvb", target, "--t", "-99")
+    assert (status, out, err.count("\n")) == (1, "", 1)
+    assert "steps of 4.65661e-10" in err
+    assert not target.exists()
 
 
 def test_a_file_may_be_edited_in_place(run, folder, tmp_path):

@@ -26,6 +26,10 @@ def bvb() -> bytes:
     return dumps(model())
 
 
+def quantised() -> bytes:
+    return dumps(model(), "quantised")
+
+
 def bsdf() -> bytes:
     return bsdf_bytes(ggx_fields(GGX(0.3, Schlick((0.9, 0.6, 0.3))), 0.3, elevations=4, density=8, samples=6))
 

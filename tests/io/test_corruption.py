@@ -5,12 +5,18 @@ import subprocess
 import sys
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 
+from tests.brdf.samples import random_pairs
 from tests.io import corruption, files
+from tests.io.test_bvb import archive, members
 
 
-@pytest.mark.parametrize(("suffix", "make"), [(".bvb", files.bvb), (".bsdf", files.bsdf), (".binary", files.merl)])
+@pytest.mark.parametrize(
+    ("suffix", "make"),
+    [(".bvb", files.bvb), (".bvb", files.quantised), (".bsdf", files.bsdf), (".binary", files.merl)],
+)
 def test_200_damaged_files_are_refused_or_harmless(suffix: str, make: Callable[[], bytes]):
     command = [sys.executable, "-m", "tests.io.corruption", suffix, "200", "7"]
     done = subprocess.run(command, input=make(), capture_output=True, timeout=400, check=False)
@@ -19,6 +25,22 @@ def test_200_damaged_files_are_refused_or_harmless(suffix: str, make: Callable[[
     assert set(told["outcomes"]) <= {"refused", "harmless"}
     assert told["outcomes"]["refused"] > 50
     assert told["peak_mb"] < 1024
+
+
+@pytest.mark.parametrize("make", [files.bvb, files.quantised])
+@pytest.mark.parametrize("member", ["meta.json", "control.npy", "knots_0.npy"])
+def test_damage_that_the_checksums_of_an_archive_cannot_see(member: str, make: Callable[[], bytes], tmp_path):
+    """Members are damaged before they are packed, as by a writer that is wrong or means harm."""
+    parts = members(make())
+    wi, wo = random_pairs(np.random.default_rng(1), 50)
+    outcomes = set()
+    for damaged in corruption.corruptions(parts[member], 150, 11):
+        if isinstance(damaged, tuple):
+            at, new = damaged
+            damaged = parts[member][:at] + new + parts[member][at + len(new) :]
+        path = files.written(tmp_path / "m.bvb", archive(parts | {member: damaged}))
+        outcomes.add(corruption.outcome(path, wi, wo))
+    assert outcomes == {"refused", "harmless"}
 
 
 def test_the_generator_is_deterministic_and_damages():

@@ -1,0 +1,232 @@
+"""Before a fit: which chart and encoding suit a BRDF, where knots go, and how the error falls with the net's size."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from bvbedit.brdf.base import Brdf
+from bvbedit.brdf.charts import Chart
+from bvbedit.brdf.encodings import Encoding
+from bvbedit.brdf.geometry import Floats
+from bvbedit.brdf.losses import Loss
+from bvbedit.brdf.problem import Problem, Table, Weights, pose, tabulate
+from bvbedit.brdf.sample_sets import draw
+from bvbedit.brdf.samples import Samples, in_chart, looked_up
+from bvbedit.brdf.spline_brdf import keep_faces
+from bvbedit.brdf.storage import Storage
+from bvbedit.errors import BvbError
+from bvbedit.spline.adaptive import (
+    AxisLines,
+    KnotPath,
+    allocate,
+    axis_lines,
+    dominant_knots,
+    marginals,
+    placed_knots,
+)
+from bvbedit.spline.arguments import shown
+from bvbedit.spline.fitting import loft
+from bvbedit.spline.knots import PLACEMENTS
+from bvbedit.spline.tensor import TensorSpline
+
+# Placements that look at the data; "free" moves the knots of "dominant".
+ADAPTIVE = ("dominant", "free")
+# An axis is tried with up to so many control points for the cube root of the net's, and a few.
+ELONGATION = 4.0
+FEW = 20
+# Knots are rounded to multiples of this, far below any spacing of data: float64 of few digits deflate to 2 or 3 bytes.
+KNOT_GRID = 2.0**-16
+# Share of the squared error that quantising may add: 4 % of the error. On six measurements at 48 KiB, spending the
+# bytes of half a bit on control points instead, or the other way round, changed the error by less than 1 %.
+QUANTISATION = 0.08
+# Pairs of each set that judge a trial.
+TRIAL_SAMPLES = 20_000
+UNSURE = 0.1
+# Turns in which the sets are balanced: one set may gain much where the other loses little.
+BALANCING = 4
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A posed problem, and the knots of each axis for every number of control points."""
+
+    problem: Problem
+    degrees: tuple[int, int, int]
+    lines: tuple[AxisLines, ...]
+    paths: tuple[KnotPath, ...]
+
+    def knots(self, size: Sequence[int]) -> tuple[Floats, ...]:
+        """Return full knot vectors for ``size`` control points.
+
+        Raises BvbError where the data of an axis do not carry so many.
+        """
+        for axis, (path, n) in enumerate(zip(self.paths, size, strict=True)):
+            if not path.fewest <= n <= path.most:
+                raise BvbError(
+                    f"{shown(n)} control points along {self.problem.chart.axes[axis]} are not what its data and degree "
+                    f"{path.degree} carry. Choose a whole number in {path.fewest} ... {path.most}."
+                )
+        return tuple(path.of(int(n)) for path, n in zip(self.paths, size, strict=True))
+
+    def walk(self, points: int) -> list[tuple[int, ...]]:
+        """Return growing sizes, from the smallest net to one of at most so many control points."""
+        return allocate(self.paths, points)
+
+    def lofted(self, size: Sequence[int]) -> TensorSpline:
+        """Return the quick fit of this size: lofting with the marginals of the weights, degenerate faces averaged."""
+        rows = [x.roots**2 for x in self.lines]
+        knots = self.knots(size)
+        spline = loft(self.problem.values, self.problem.table.axes, knots, self.degrees, rows).spline
+        return spline.with_control(keep_faces(spline.control, self.problem.chart))
+
+    def storage(self, precision: str, errors: Floats) -> Storage:
+        """Return how a net with these ``errors`` over the sets (2,) is stored best in ``precision``.
+
+        A step h moves control points evenly within half a step, values by h^2/12 times the mean sum of squares of the
+        basis functions, and the metric by the mean weight times that.
+        """
+        if precision != "quantised":
+            return Storage(precision)
+        problem = self.problem
+        overlap = float(np.prod([_overlap(x, path) for x, path in zip(self.lines, self.paths, strict=True)]))
+        allowed = QUANTISATION * float(np.dot(problem.balance, errors**2))
+        largest = float(np.abs(problem.values).max())
+        step = np.sqrt(12 * allowed / max(problem.weights.mean() * overlap, np.finfo(float).tiny))
+        return Storage(precision, float(np.clip(step, max(largest, 1e-3) * 2.0**-20, max(largest, 1e-3) * 2.0**-4)))
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What a chart and an encoding are good for, by a quick fit on a coarse grid."""
+
+    chart: Chart
+    encoding: Encoding
+    balance: tuple[float, float]
+    """What an error over each of the sets counts, so that their product is small."""
+    errors: Floats
+    """The metric over samples of each of the sets (2,), but for its scale."""
+
+    @property
+    def score(self) -> float:
+        """The geometric mean of the errors, by which trials are compared."""
+        return float(np.sqrt(np.prod(self.errors)))
+
+
+@dataclass(frozen=True)
+class _Bench:
+    """A chart on trial."""
+
+    table: Table
+    samples: Samples
+    loss: Loss
+    points: int
+
+    def trial(self, encoding: Encoding, degrees: Sequence[int], weights: Weights | None) -> Trial:
+        """Return what the chart does with ``encoding``, the sets balanced by turns of fitting and measuring."""
+
+        def planned(balance: tuple[float, float]) -> Plan:
+            return plan(
+                self.table,
+                encoding,
+                self.loss,
+                balance,
+                degrees=degrees,
+                placement="dominant",
+                points=self.points,
+                weights=weights,
+            )
+
+        black = self.samples.errors(np.zeros_like(self.samples.reflectance), self.loss)
+        balance = balance_of(black)
+        made = planned(balance)
+        knots = made.knots(made.walk(self.points)[-1])
+        for _ in range(BALANCING):
+            problem = pose(self.table, encoding, self.loss, balance, weights)
+            spline = loft(problem.values, self.table.axes, knots, made.degrees, marginals(problem.weights)).spline
+            balance = balance_of(self._errors(spline, encoding))
+        made = planned(balance)
+        return Trial(
+            self.table.chart, encoding, balance, self._errors(made.lofted(made.walk(self.points)[-1]), encoding)
+        )
+
+    def _errors(self, spline: TensorSpline, encoding: Encoding) -> Floats:
+        kept = spline.with_control(keep_faces(spline.control, self.table.chart))
+        return self.samples.errors_of(kept, encoding, self.loss)
+
+
+def plan(
+    table: Table,
+    encoding: Encoding,
+    loss: Loss,
+    balance: Sequence[float],
+    *,
+    degrees: Sequence[int],
+    placement: str,
+    points: int,
+    weights: Weights | None = None,
+) -> Plan:
+    """Return the problem of ``table`` with knots for nets of up to about so many ``points`` on each axis."""
+    problem = pose(table, encoding, loss, balance, weights)
+    lines = axis_lines(problem.values, problem.weights, table.axes)
+    p0, p1, p2 = (int(p) for p in degrees)
+    paths = tuple(_path(x, placement, p, points) for x, p in zip(lines, (p0, p1, p2), strict=True))
+    return Plan(problem, (p0, p1, p2), lines, paths)
+
+
+def checked_placement(name: object) -> str:
+    """Return ``name``. Raises BvbError where it places no knots."""
+    if not isinstance(name, str) or name not in (*ADAPTIVE, *PLACEMENTS):
+        raise BvbError(f"Unknown knot placement {shown(name)}. Choose one of {', '.join((*ADAPTIVE, *PLACEMENTS))}.")
+    return name
+
+
+def _path(lines: AxisLines, placement: str, degree: int, points: int) -> KnotPath:
+    m = len(lines.parameters)
+    most = min(m, max(degree + 1, int(ELONGATION * points ** (1 / 3)) + FEW))
+    if placement in PLACEMENTS:
+        return placed_knots(lines, placement, degree, most)
+    path = dominant_knots(lines, degree, most)
+    rounded = tuple(np.round(t / KNOT_GRID) * KNOT_GRID for t in path.knots)
+    return KnotPath(degree, rounded, path.errors)
+
+
+def _overlap(lines: AxisLines, path: KnotPath) -> float:
+    """Return the mean sum of squares of the basis functions of an axis at its data."""
+    knots = path.knots[-1]
+    rows = lines.collocation(knots, path.degree).rows / lines.roots[:, None]
+    return float(np.mean(np.sum(rows**2, axis=1)))
+
+
+def try_charts(
+    brdf: Brdf,
+    charts: Sequence[Chart],
+    encodings: Sequence[Encoding],
+    loss: Loss,
+    *,
+    degrees: Sequence[int],
+    points: int,
+    weights: Weights | None = None,
+) -> list[Trial]:
+    """Return trials of each chart with each encoding for nets of about so many ``points``, the best one first.
+
+    A trial lofts over dominant points on the coarse grid of the chart, judged by samples of the metric itself: what a
+    folded chart cannot represent counts against it.
+    """
+    reflectance = looked_up(brdf, draw(brdf, TRIAL_SAMPLES))
+    tried = []
+    for chart in charts:
+        bench = _Bench(tabulate(brdf, chart, chart.trial_grid), in_chart(reflectance, chart, weights), loss, points)
+        tried.append((bench.trial(encodings[0], degrees, weights), bench))
+    tried.sort(key=lambda t: t[0].score)
+    # The other encodings are tried in the chart that is best with the first.
+    bench = tried[0][1]
+    trials = [t for t, _ in tried] + [bench.trial(encoding, degrees, weights) for encoding in encodings[1:]]
+    # Errors that differ by less than the choice is sure of are the same: then the first encoding serves.
+    return sorted(trials, key=lambda t: t.score * (1.0 if t.encoding == encodings[0] else 1 + UNSURE))
+
+
+def balance_of(errors: Floats) -> tuple[float, float]:
+    """Return what an error over each set counts, so that both fall by the same share: the inverse squares."""
+    inverse = 1.0 / np.maximum(errors, max(1e-6 * errors.max(), np.finfo(float).tiny)) ** 2
+    return float(inverse[0] / inverse.max()), float(inverse[1] / inverse.max())

@@ -1,0 +1,112 @@
+"""Pairs drawn from the sample sets, as the metric sees them in a chart: what fits are judged and polished by."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from bvbedit.brdf.base import Brdf
+from bvbedit.brdf.charts import Chart
+from bvbedit.brdf.encodings import Encoding
+from bvbedit.brdf.geometry import Floats
+from bvbedit.brdf.losses import Loss
+from bvbedit.brdf.problem import Weights, checked_weights
+from bvbedit.brdf.sample_sets import LARGEST_REFLECTANCE, Pairs, draw
+from bvbedit.spline.tensor import TensorSpline
+
+# Pairs drawn from each set: at least so many, and so many for each control point.
+FEWEST = 100_000
+FOR_EACH_POINT = 6
+MOST = 600_000
+# Of these every so many-th is kept aside to judge a step by: samples that noise fills are easily followed too closely.
+JUDGE = 5
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Pairs drawn from the sample sets, as the metric sees them in a chart."""
+
+    parameters: Floats
+    """(N, 3)."""
+    reflectance: Floats
+    """(N, 3)."""
+    cosines: tuple[Floats, Floats]
+    """(N, 1) of the elevations."""
+    parts: tuple[slice, slice]
+    """The places of each set."""
+    weights: Floats
+    """(N, 1)."""
+
+    def errors(self, f: Floats, loss: Loss) -> Floats:
+        """Return the metric over each of the sets (2,), but for its scale, of a model's reflectance ``f`` (N, 3)."""
+        e = loss.transform(f, *self.cosines) - loss.transform(self.reflectance, *self.cosines)
+        # A set without a sample, as tables with large holes have it, says nothing: the other one speaks for it.
+        found = [loss.norm(e[part]) for part in self.parts if part.stop > part.start]
+        return np.array([found[0], found[-1]]) if found else np.zeros(2)
+
+    def metrics(self, errors: Floats, loss: Loss) -> tuple[float, float]:
+        """Return the metric itself over each of the sets, for the ``errors`` (2,) of a model."""
+        target = loss.transform(self.reflectance, *self.cosines)
+        grid, nodes = (loss.metric(float(e), target[part]) for e, part in zip(errors, self.parts, strict=True))
+        return grid, nodes
+
+    def errors_of(self, spline: TensorSpline, encoding: Encoding, loss: Loss) -> Floats:
+        """Return ``errors`` of the model that ``spline`` is in these samples' chart."""
+        return self.errors(encoding.decode(spline.evaluate(self.parameters)), loss)
+
+
+def draw_samples(brdf: Brdf, chart: Chart, count: int, seed: int = 0, weights: Weights | None = None) -> Samples:
+    """Return about ``count`` pairs of each set, with the reflectance of ``brdf``; ``seed`` chooses which.
+
+    Pairs without data behind them are left out. Raises BvbError for weights that are none.
+    """
+    return in_chart(looked_up(brdf, draw(brdf, count, seed)), chart, weights)
+
+
+@dataclass(frozen=True)
+class Reflectance:
+    """Pairs of the sample sets with data behind them, and the reflectance there."""
+
+    pairs: Pairs
+    f: Floats
+    """(N, 3)."""
+
+
+def looked_up(brdf: Brdf, pairs: Pairs) -> Reflectance:
+    """Return those of the ``pairs`` behind which ``brdf`` has data, and its reflectance."""
+    f, trusted = brdf.evaluate_unit(pairs.wi, pairs.wo)
+    counts = np.array([np.count_nonzero(trusted[part]) for part in pairs.parts()])
+    kept = Pairs(pairs.wi[trusted], pairs.wo[trusted], (int(counts[0]), int(counts[1])))
+    return Reflectance(kept, np.minimum(f[trusted], LARGEST_REFLECTANCE))
+
+
+def in_chart(reflectance: Reflectance, chart: Chart, weights: Weights | None = None) -> Samples:
+    """Return pairs and reflectance as samples in ``chart``. Raises BvbError for weights that are none."""
+    pairs = reflectance.pairs
+    parameters = chart.to_parameters(pairs.wi, pairs.wo)
+    given = np.ones(len(parameters)) if weights is None else checked_weights(weights, parameters)
+    cosines = pairs.wi[:, 2:], pairs.wo[:, 2:]
+    return Samples(parameters, reflectance.f, cosines, pairs.parts(), given[:, None])
+
+
+def split(samples: Samples) -> tuple[Samples, Samples]:
+    """Return the samples to fit and those to judge by."""
+    judging = np.arange(len(samples.parameters)) % JUDGE == 0
+    out = []
+    for chosen in (~judging, judging):
+        count = int(np.count_nonzero(chosen[samples.parts[0]]))
+        total = int(np.count_nonzero(chosen))
+        out.append(
+            Samples(
+                samples.parameters[chosen],
+                samples.reflectance[chosen],
+                (samples.cosines[0][chosen], samples.cosines[1][chosen]),
+                (slice(0, count), slice(count, total)),
+                samples.weights[chosen],
+            )
+        )
+    return out[0], out[1]
+
+
+def samples_for(points: int) -> int:
+    """Return how many pairs of each set a net of so many control points needs."""
+    return min(max(FEWEST, FOR_EACH_POINT * points), MOST)

@@ -1,0 +1,87 @@
+"""How large a net has to be: the error over the number of control points, its knee, and the size for a tolerance."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from bvbedit.brdf.plan import Plan
+from bvbedit.brdf.samples import Samples
+
+# The curve is walked in doublings from here.
+FIRST_POINTS = 125
+# Twice the control points are worth having while they take away at least this share of the error.
+WORTH_DOUBLING = 0.15
+# Errors that differ by less are the same.
+AS_GOOD = 0.02
+
+
+@dataclass(frozen=True)
+class Step:
+    """A net on the way: what a quick fit of this size is off by."""
+
+    size: tuple[int, ...]
+    grid: float
+    """The metric over the set ``grid``."""
+    nodes: float
+    """The metric over the set ``nodes``."""
+
+    @property
+    def points(self) -> int:
+        """The number of control points."""
+        return int(np.prod(self.size))
+
+    @property
+    def score(self) -> float:
+        """The geometric mean of the metric over both sets."""
+        return float(np.sqrt(self.grid * self.nodes))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures with three digits."""
+        return {"size": list(self.size), "grid": float(f"{self.grid:.3g}"), "nodes": float(f"{self.nodes:.3g}")}
+
+
+def error_curve(made: Plan, samples: Samples, most: int) -> list[Step]:
+    """Return the nets on the greedy walk whose control points double, up to ``most``, each lofted and measured."""
+    walk = made.walk(most)
+    points = [int(np.prod(size)) for size in walk]
+    wanted = FIRST_POINTS * 2.0 ** np.arange(0, np.log2(max(most / FIRST_POINTS, 1.0)) + 1e-9)
+    chosen = sorted({int(np.searchsorted(points, min(w, points[-1]))) for w in wanted} | {len(walk) - 1})
+    return [step_of(made, samples, walk[i]) for i in chosen]
+
+
+def step_of(made: Plan, samples: Samples, size: tuple[int, ...]) -> Step:
+    """Return what a quick fit of ``size`` is off by."""
+    problem = made.problem
+    errors = samples.errors_of(made.lofted(size), problem.encoding, problem.loss)
+    return Step(size, *samples.metrics(errors, problem.loss))
+
+
+def knee(curve: list[Step]) -> Step:
+    """Return the smallest net beyond which no doubling of the control points takes away ``WORTH_DOUBLING``."""
+    for step, larger in reversed(list(pairwise(curve))):
+        doublings = np.log2(larger.points / step.points)
+        if larger.score < step.score * (1 - WORTH_DOUBLING) ** doublings:
+            return larger
+    return curve[0]
+
+
+def sufficient(curve: list[Step]) -> Step:
+    """Return the smallest net that is as good as the best one, up to ``AS_GOOD``: no control points without effect."""
+    best = min(step.score for step in curve)
+    return next(step for step in curve if step.score <= (1 + AS_GOOD) * best)
+
+
+def points_for(curve: list[Step], tolerance: float) -> int:
+    """Return about how many control points bring the metric over both sets down to ``tolerance``, by interpolation."""
+    points = np.log([s.points for s in curve])
+    errors = np.log([max(s.grid, s.nodes, 1e-300) for s in curve])
+    below = np.flatnonzero(errors <= np.log(tolerance))
+    if len(below) == 0:
+        return curve[-1].points * 2
+    i = int(below[0])
+    if i == 0:
+        return curve[0].points
+    share = (errors[i - 1] - np.log(tolerance)) / (errors[i - 1] - errors[i])
+    return int(np.exp(points[i - 1] + share * (points[i] - points[i - 1])))
