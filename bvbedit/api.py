@@ -13,6 +13,7 @@ from bvbedit.brdf.encodings import Encoding, encoding_named
 from bvbedit.brdf.fit import THOROUGH_ROUNDS, fit_net, is_published, settle
 from bvbedit.brdf.losses import Loss, loss_named
 from bvbedit.brdf.metrics import Comparison, compare, estimate
+from bvbedit.brdf.noise import estimate_noise
 from bvbedit.brdf.plan import Plan, Trial, checked_placement, plan, try_charts
 from bvbedit.brdf.problem import Weights, tabulate
 from bvbedit.brdf.samples import Samples, draw_samples
@@ -146,7 +147,7 @@ def fit(
         model, curve = _within(brdf, made, wish, samples, budget, count, trials, start, progress)
         return model
     else:
-        curve = error_curve(made, samples, LARGEST_KNEE)
+        curve = error_curve(made, samples, LARGEST_KNEE, features=tolerance is None)
         if tolerance is None:
             model = _settled(brdf, made, knee(curve).size, wish, samples, progress)
         else:
@@ -211,7 +212,19 @@ def _settled(
     else:
         model = settle(brdf, made, size, weights=wish.weights, rounds=wish.rounds, progress=progress)
     errors = samples.errors_of(model.spline, encoding, wish.loss)
+    if wish.knots == "free":
+        freed = settle(brdf, made.freed(size), size, weights=wish.weights, rounds=wish.rounds, progress=progress)
+        better = samples.errors_of(freed.spline, encoding, wish.loss)
+        gain = float(np.sqrt(np.prod(better) / max(np.prod(errors), np.finfo(float).tiny)))
+        if gain < 1:
+            model, errors = freed, better
+        notes = [*model.report["notes"], f"free knots: {gain:.3g} times the error of dominant points, {_kept(gain)}"]
+        model = model.told(notes=notes)
     return model.stored_as(made.storage(wish.precision, errors)).told(knots=wish.knots, source=wish.source)
+
+
+def _kept(gain: float) -> str:
+    return "kept" if gain < 1 else "left"
 
 
 def _within(
@@ -284,6 +297,7 @@ def _told(model: SplineBrdf, brdf: Brdf, trials: list[Trial], curve: list[Step],
     return model.told(
         metrics=estimate(stored, brdf).to_dict(),
         soundness=soundness(stored, brdf),
+        noise=estimate_noise(brdf, loss_named(model.report.get("metric", "log_cosine_rms"))).to_dict(),
         tried=[
             {
                 "chart": t.chart.name,

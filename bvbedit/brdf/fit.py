@@ -1,4 +1,4 @@
-"""Fitting a B-spline volume to any BRDF: a plan, a net by weighted least squares, and a few steps on the metric itself."""
+"""Fitting a B-spline volume to any BRDF: a plan, a net by weighted least squares, a few steps on the metric itself."""
 
 import sys
 from collections.abc import Callable, Sequence
@@ -77,6 +77,8 @@ def fit_net(
         points=max(size) ** 3,
         weights=weights,
     )
+    if knots == "free":
+        made = made.freed(size)
     return settle(brdf, made, size, weights=weights, progress=progress).told(
         knots=knots, seconds=perf_counter() - start
     )

@@ -1,7 +1,7 @@
 """Before a fit: which chart and encoding suit a BRDF, where knots go, and how the error falls with the net's size."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,6 +27,7 @@ from bvbedit.spline.adaptive import (
 )
 from bvbedit.spline.arguments import shown
 from bvbedit.spline.fitting import loft
+from bvbedit.spline.free_knots import move_knots
 from bvbedit.spline.knots import PLACEMENTS
 from bvbedit.spline.tensor import TensorSpline
 
@@ -40,6 +41,9 @@ KNOT_GRID = 2.0**-16
 # Share of the squared error that quantising may add: 4 % of the error. On six measurements at 48 KiB, spending the
 # bytes of half a bit on control points instead, or the other way round, changed the error by less than 1 %.
 QUANTISATION = 0.08
+# A control point follows a feature if it takes away so many times what it would of noise: one is the mean, and the
+# largest of some dozen such gains is about twice that (the penalty of Mallows' Cp too).
+FEATURE = 2.0
 # Pairs of each set that judge a trial.
 TRIAL_SAMPLES = 20_000
 UNSURE = 0.1
@@ -69,9 +73,21 @@ class Plan:
                 )
         return tuple(path.of(int(n)) for path, n in zip(self.paths, size, strict=True))
 
-    def walk(self, points: int) -> list[tuple[int, ...]]:
-        """Return growing sizes, from the smallest net to one of at most so many control points."""
-        return allocate(self.paths, points)
+    def walk(self, points: int, *, features: bool = False) -> list[tuple[int, ...]]:
+        """Return growing sizes, from the smallest net to one of at most so many control points.
+
+        With ``features`` no control point is spent that takes away no more than noise would give it.
+        """
+        floors = [FEATURE * float(x.noise.mean()) for x in self.lines] if features else None
+        return allocate(self.paths, points, floors)
+
+    def freed(self, size: Sequence[int]) -> "Plan":
+        """Return the plan with the knots for ``size`` moved freely along each axis, from where they are."""
+        paths = []
+        for lines, path, knots in zip(self.lines, self.paths, self.knots(size), strict=True):
+            moved = move_knots(lines, knots, path.degree)
+            paths.append(path.with_knots(_rounded(moved.knots), moved.error))
+        return replace(self, paths=tuple(paths))
 
     def lofted(self, size: Sequence[int]) -> TensorSpline:
         """Return the quick fit of this size: lofting with the marginals of the weights, degenerate faces averaged."""
@@ -168,7 +184,7 @@ def plan(
 ) -> Plan:
     """Return the problem of ``table`` with knots for nets of up to about so many ``points`` on each axis."""
     problem = pose(table, encoding, loss, balance, weights)
-    lines = axis_lines(problem.values, problem.weights, table.axes)
+    lines = axis_lines(problem.values, problem.weights, table.axes, problem.variance)
     p0, p1, p2 = (int(p) for p in degrees)
     paths = tuple(_path(x, placement, p, points) for x, p in zip(lines, (p0, p1, p2), strict=True))
     return Plan(problem, (p0, p1, p2), lines, paths)
@@ -187,8 +203,11 @@ def _path(lines: AxisLines, placement: str, degree: int, points: int) -> KnotPat
     if placement in PLACEMENTS:
         return placed_knots(lines, placement, degree, most)
     path = dominant_knots(lines, degree, most)
-    rounded = tuple(np.round(t / KNOT_GRID) * KNOT_GRID for t in path.knots)
-    return KnotPath(degree, rounded, path.errors)
+    return KnotPath(degree, tuple(_rounded(t) for t in path.knots), path.errors)
+
+
+def _rounded(knots: Floats) -> Floats:
+    return np.asarray(np.round(knots / KNOT_GRID) * KNOT_GRID)
 
 
 def _overlap(lines: AxisLines, path: KnotPath) -> float:

@@ -23,6 +23,8 @@ Weights = Callable[[Floats], Floats]
 MIRROR = np.array([1.0, -1.0, 1.0])
 # Layers of the first axis that are looked up at once.
 LAYERS = 12
+# Variances below this share of the square of the value are rounding.
+ROUNDING = 1e-12
 # Densities on the faces of a chart are taken so much of a node's distance inside.
 INSIDE = 0.5
 # Where no sample set looks (beyond 80 degrees), the density that keeps the model at the data, of the sets' mean. With
@@ -66,6 +68,8 @@ class Problem:
     """(m_0, m_1, m_2, 3) encoded means over the sides, held where no data are."""
     weights: Floats
     """(m_0, m_1, m_2)."""
+    variance: Floats | None
+    """(m_0, m_1, m_2): of the noise of ``values``, summed over channels, where several sides of equal standing tell."""
 
     @property
     def chart(self) -> Chart:
@@ -186,9 +190,23 @@ def pose(
     ]
     density = np.sum(parts, axis=0)
     known = density > 0
-    values = sum(p[..., None] * encoding.encode(f) for p, f in zip(parts, table.sides, strict=True))
-    values /= np.where(known, density, 1.0)[..., None]
-    values = hold(values, known, table.chart.hold_order) if not known.all() else values
+    filled = np.where(known, density, 1.0)[..., None]
+    values, squares = np.zeros_like(table.sides[0]), np.zeros(shape)
+    tells = table.chart.reciprocal and len(parts) > 1
+    for part, side in zip(parts, table.sides, strict=True):
+        y = encoding.encode(side)
+        share = part[..., None] / filled
+        values += share * y
+        if tells:
+            squares += np.einsum("...c,...c->...", y, share * y)
+    variance = None
+    if tells:
+        # Of the mean over k sides, from their spread; a single side tells nothing.
+        others = np.maximum(np.sum(table.trusted, axis=0) - 1, 1)
+        variance = np.maximum(squares - np.einsum("...c,...c->...", values, values), 0.0) / others
+        variance[variance < ROUNDING * squares] = 0.0
+    if not known.all():
+        values = hold(values, known, table.chart.hold_order)
     density = np.where(known, density, HELD * mean)
     if weights is not None:
         density = density * checked_weights(weights, grid_points(table.axes)).reshape(shape)
@@ -199,7 +217,7 @@ def pose(
     squared = np.einsum("...c,...c->...", slope, slope) / 3
     # Where all channels are black their slope may be zero: the model is to be black there too.
     squared = np.maximum(squared, 1e-9 * squared.max())
-    return Problem(table, encoding, loss, (float(balance[0]), float(balance[1])), values, density * squared)
+    return Problem(table, encoding, loss, (float(balance[0]), float(balance[1])), values, density * squared, variance)
 
 
 def checked_weights(weights: Weights, points: Floats) -> Floats:

@@ -1,6 +1,6 @@
 """A BRDF as chart + encoding + B-spline volume: the BVB of Lee & Park (2008), with any chart and encoding."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 from typing import Any
 

@@ -11,9 +11,15 @@ NOISE = 0.02
 FITS: dict[str, tuple[str, dict[str, Any]]] = {
     "paper": (
         "the paper's configuration",
-        {"chart": "in-out", "encoding": "linear", "size": (20, 20, 80), "knots": "piegl-tiller"},
+        {
+            "chart": "in-out",
+            "encoding": "linear",
+            "size": (20, 20, 80),
+            "knots": "piegl-tiller",
+            "precision": "float32",
+        },
     ),
-    "adaptive": ("adaptive, 24 KiB", {"max_bytes": 24 * 1024}),
+    "adaptive": ("automatic, 16 KiB", {"max_bytes": 16 * 1024}),
 }
 PICTURE: dict[str, Any] = {"width": 320, "height": 320, "spp": 64}
 # Differences are made visible by a power of two, so that one pixel in a hundred is as bright as can be.
@@ -73,7 +79,7 @@ def demo(*, out: Path = Path("bvbedit-demo"), as_json: Json = False) -> None:
         for name, brdf in {"measured": measured, **models}.items()
     }
     errors = _pictures(out, material.brdf, measured, models)
-    missing = _screenshot(out, measured, models["half-diff"])
+    missing = _screenshot(out, measured, models["adaptive"])
     with replacing(out / "report.md") as stream:
         table_bytes = (out / f"{MATERIAL}.binary").stat().st_size
         stream.write(_report(material.description, table_bytes, rows, truth, errors, missing).encode())
@@ -208,5 +214,5 @@ def _report(
     if missing:
         lines += [missing, ""]
     else:
-        lines += ["Iso-value surfaces, control net and lobes of the half-diff model:", "", "![volume](volume.png)", ""]
+        lines += ["Iso-value surfaces, control net and lobes of the adaptive model:", "", "![volume](volume.png)", ""]
     return "\n".join(lines)

@@ -161,7 +161,7 @@ def describe_model(model: Any, file: Path) -> dict[str, Any]:
         "face_spread": face_spread(spline.control, model.chart),
         **{k: told.get(k) for k in ("source", "knots", "condition", "seconds", "notes", "metrics")},
         "soundness": told["soundness"] if "soundness" in told else soundness_of(model),
-        **{k: told[k] for k in ("tried", "curve") if k in told},
+        **{k: told[k] for k in ("noise", "tried", "curve") if k in told},
     }
 
 

@@ -33,6 +33,10 @@ MIX = 0.5
 CANDIDATES = 3
 
 
+# A deviation counts as a feature from so many times the noise on: the sums over a row's lines are known that well.
+SURE = 1.1
+
+
 @dataclass(frozen=True)
 class AxisLines:
     """All weighted lines of a table along one axis, as far as least squares can tell them apart."""
@@ -43,6 +47,8 @@ class AxisLines:
     """(m, k): factor factor^T is the Gram matrix of the lines, their rows times ``roots``."""
     roots: Floats
     """(m,): square roots of the rows' weights, > 0."""
+    noise: Floats
+    """(m,): what the noise of the data puts into the squared norm of each row."""
 
     def collocation(self, knots: Floats, degree: int) -> Banded:
         """Return the weighted collocation matrix (m, n)."""
@@ -89,13 +95,25 @@ class KnotPath:
         """Return the knots for ``size`` control points."""
         return self.knots[size - self.fewest]
 
+    def with_knots(self, knots: Floats, error: float) -> "KnotPath":
+        """Return the path with other ``knots`` for their number of control points, which leave ``error``."""
+        i = len(knots) - 2 * (self.degree + 1)
+        vectors = (*self.knots[:i], knots, *self.knots[i + 1 :])
+        errors = self.errors.copy()
+        errors[i] = error
+        return KnotPath(self.degree, vectors, errors)
+
     def error_of(self, size: int) -> float:
         """Return the squared norm of the residual for ``size`` control points."""
         return float(self.errors[size - self.fewest])
 
 
-def axis_lines(values: Floats, weights: Floats, parameters: Sequence[Floats]) -> tuple[AxisLines, ...]:
+def axis_lines(
+    values: Floats, weights: Floats, parameters: Sequence[Floats], variance: Floats | None = None
+) -> tuple[AxisLines, ...]:
     """Return the lines of ``values`` (m_1, ..., m_d, c) along each axis.
+
+    ``variance`` (m_1, ..., m_d) of the data's noise, summed over channels, is zero where it is not given.
 
     ``weights`` (m_1, ..., m_d) >= 0 need not be separable: each axis takes the mean over the others for its rows, and
     the mean over itself for the lines. ``parameters`` are the d increasing grid axes. Raises BvbError for shapes that
@@ -114,6 +132,7 @@ def axis_lines(values: Floats, weights: Floats, parameters: Sequence[Floats]) ->
     # Squares of extreme data leave the range of float64: knots do not depend on the scale, only the errors do.
     weights = weights / weights.max()
     rows = marginals(weights)
+    noise = np.zeros(shape) if variance is None else weights * variance
     out = []
     for a, u in enumerate(nodes):
         roots = np.sqrt(rows[a])
@@ -123,7 +142,8 @@ def axis_lines(values: Floats, weights: Floats, parameters: Sequence[Floats]) ->
         eigenvalues, vectors = np.linalg.eigh(gram)
         kept = np.cumsum(np.maximum(eigenvalues, 0.0)) > NEGLIGIBLE_ENERGY * max(np.trace(gram), np.finfo(float).tiny)
         kept[-1] = True
-        out.append(AxisLines(u, vectors[:, kept] * np.sqrt(np.maximum(eigenvalues[kept], 0.0)), roots))
+        factor = vectors[:, kept] * np.sqrt(np.maximum(eigenvalues[kept], 0.0))
+        out.append(AxisLines(u, factor, roots, noise.sum(axis=tuple(b for b in range(len(nodes)) if b != a))))
     return tuple(out)
 
 
@@ -153,12 +173,14 @@ def dominant_knots(lines: AxisLines, degree: int, most: int) -> KnotPath:
         raise BvbError(f"{shown(most)} control points over {m} data: choose a whole number in {p + 1} ... {m}.")
     curvature = _turning(lines)
     points = _balanced_seeds(u, curvature, p + 1)
+    # Which of several splits leaves least is a matter of noise, where there is noise.
+    candidates = 1 if lines.noise.any() else CANDIDATES
     knots = [_means(u, points, p)]
     errors = [lines.error(knots[0], p)]
     while len(points) < most:
         best = None
         residual = np.sum(lines.residual(knots[-1], p) ** 2, axis=1)
-        for a, b in _segments(points, residual)[:CANDIDATES]:
+        for a, b in _segments(u, points, np.maximum(residual - SURE * lines.noise, 0.0))[:candidates]:
             new = _split(u, curvature, a, b)
             tried = sorted([*points, new])
             # The means are the method; a knot is only inserted where they would raise the error.
@@ -237,11 +259,11 @@ def _share(x: Floats) -> Floats:
     return (x - x[0]) / span if span > 0 else np.zeros(len(x))
 
 
-def _segments(points: Sequence[int], residual: Floats) -> list[tuple[int, int]]:
-    """Return the segments that can be split, those with the largest sum of ``residual`` (m,) first."""
-    ends = [*points, len(residual) - 1] if len(points) == 1 else points
+def _segments(u: Floats, points: Sequence[int], deviation: Floats) -> list[tuple[int, int]]:
+    """Return the segments that can be split: the largest sum of ``deviation`` (m,) first, then the longest."""
+    ends = [*points, len(u) - 1] if len(points) == 1 else points
     segments = [(a, b) for a, b in pairwise(ends) if b - a > 1]
-    return sorted(segments, key=lambda s: (-float(residual[s[0] : s[1] + 1].sum()), s[0]))
+    return sorted(segments, key=lambda s: (-float(deviation[s[0] : s[1] + 1].sum()), u[s[0]] - u[s[1]], s[0]))
 
 
 def _split(u: Floats, curvature: Floats, a: int, b: int) -> int:

@@ -37,9 +37,8 @@ PER_DECADE = 3
 # Steps of the golden section: they shrink two thirds of a decade below a hundredth of one.
 STEPS = 10
 GOLDEN = (5**0.5 - 1) / 2
-# Passes in which data of weight zero take the value of the smoothed others, and the strength that these are made with.
-PASSES = 3
-FILLING = 100.0
+# Data of weight zero take the values of ever less smoothed others: wide gaps are filled first, then their rims.
+FILLINGS = (1e6, 1e5, 1e4, 1e3, 1e2, 1e1, 1.0)
 
 
 @dataclass(frozen=True)
@@ -93,7 +92,7 @@ def smooth(
     start: Floats | None = None,
     project: Callable[[Floats], Floats] = lambda control: control,
     strength: float | None = None,
-    tolerance: float = 1e-4,
+    tolerance: float = 1e-3,
     max_iterations: int = 200,
     progress: Callable[[float], None] | None = None,
 ) -> tuple[FitResult, Smoothing]:
@@ -130,7 +129,7 @@ def smooth(
         degrees,
         start=problem.net(smoothing.strength) if start is None else start,
         project=project,
-        penalty=[smoothing.strength**0.5 * e for e in problem.differences],
+        penalty=[smoothing.strength**0.5 * e for e in problem.rows],
         tolerance=tolerance,
         max_iterations=max_iterations,
         progress=progress,
@@ -166,6 +165,22 @@ def _ratio(factor: Floats, differences: Floats) -> float:
     return float(np.vdot(factor, factor) / np.vdot(differences, differences)) if differences.size else 1.0
 
 
+def _split(images: Sequence[Floats], values: Floats) -> tuple[Floats, float]:
+    """Return the coefficients (n_1, ..., n_d, c) of ``values`` in the columns of ``images``, and |what they leave|^2.
+
+    That is a sum axis by axis: the difference of two sums would be rounding where data have little noise.
+    """
+    left = 0.0
+    for a, image in enumerate(images):
+        shape = values.shape
+        lines = values.reshape(int(np.prod(shape[:a])), shape[a], -1)
+        inside = image.T @ lines
+        rest = lines - image @ inside
+        left += float(np.vdot(rest, rest))
+        values = inside.reshape(*shape[:a], -1, *shape[a + 1 :])
+    return values, left
+
+
 class _Problem:
     """The penalised problem under separable weights, in the basis that makes it diagonal."""
 
@@ -179,52 +194,34 @@ class _Problem:
     ) -> None:
         known = weights > 0
         largest = weights.max()
-        axes, marginals, level = marginal_axes(weights / largest, parameters, knots, degrees)
+        axes, marginals, _ = marginal_axes(weights / largest, parameters, knots, degrees)
         differences = [second_differences(t, p) for t, p in zip(knots, degrees, strict=True)]
-        scales = [_ratio(a.factor, e) for a, e in zip(axes, differences, strict=True)]
-        self.differences = [s**0.5 * e for s, e in zip(scales, differences, strict=True)]
-        """sqrt(s_a) D_a."""
-        modes = [diagonalised(a, e) for a, e in zip(axes, self.differences, strict=True)]
+        self.rows = [_ratio(a.factor, e) ** 0.5 * e for a, e in zip(axes, differences, strict=True)]
+        """(k_a, n_a): sqrt(s_a) D_a."""
+        modes = [diagonalised(a, e) for a, e in zip(axes, self.rows, strict=True)]
         self._bases = [m[0] for m in modes]
-        self._roots = [np.sqrt(w) for w in marginals]
-        # (m_a, n_a), with orthonormal columns.
-        self._images = [
-            r[:, None] * a.matrix.apply(b, 0) for a, b, r in zip(axes, self._bases, self._roots, strict=True)
-        ]
         self._damping = outer_sum([m[2] for m in modes])
+        roots = [np.sqrt(w) for w in marginals]
+        # (m_a, n_a): sqrt(W_a) A_a T_a, of orthonormal columns.
+        images = [r[:, None] * a.matrix.apply(b, 0) for a, b, r in zip(axes, self._bases, roots, strict=True)]
         self._count, self._channels = int(known.sum()), values.shape[-1]
+        # The product of the marginals stands for the weights of those data that have any.
+        replaced = float(along_all([w[None] for w in marginals], known[..., None].astype(np.float64)).sum())
+        self._unit = float(np.sqrt(largest) * np.sqrt((weights / largest).sum() / replaced))
         # Squares of extreme data leave the range of float64. What has no weight has no influence.
         values = values if known.all() else np.where(known[..., None], values, 0.0)
         self._exponent = int(np.frexp(max(values.max(), -values.min()))[1])
-        self._unit = float(np.sqrt(level) * np.sqrt(largest))
         values = np.ldexp(values, -self._exponent)
-        self._analyse(values)
-        for filling in () if known.all() else FILLINGS:
-            if filling is None:
-                self._energy = np.sum(self._coefficients**2, axis=-1)
-                filling = self.best().strength
-            fitted = self._solved(filling)
+        for strength in () if known.all() else FILLINGS:
+            self._coefficients = along_all([i.T * r for i, r in zip(images, roots, strict=True)], values)
+            fitted = self._solved(strength)
             for a in reversed(range(len(axes))):
                 fitted = axes[a].matrix.apply(fitted, a)
-            self._analyse(np.where(known[..., None], values, fitted))
+            values = np.where(known[..., None], values, fitted)
+        for a, root in enumerate(roots):
+            values = values * root.reshape(-1, *[1] * (values.ndim - a - 1))
+        self._coefficients, self._outside = _split(images, values)
         self._energy = np.sum(self._coefficients**2, axis=-1)
-
-    def _analyse(self, values: Floats) -> None:
-        """Find the coefficients (n_1, ..., n_d, c) of ``values``, and the sum of squares that no net reaches.
-
-        That is a sum axis by axis: the difference of two sums would be rounding where data have little noise.
-        """
-        self._outside = 0.0
-        for a, root in enumerate(self._roots):
-            values = values * root.reshape((-1, *[1] * (values.ndim - a - 1)))
-        for a, image in enumerate(self._images):
-            shape = values.shape
-            lines = values.reshape(int(np.prod(shape[:a])), shape[a], -1)
-            inside = image.T @ lines
-            lines = lines - image @ inside
-            self._outside += float(np.vdot(lines, lines))
-            values = inside.reshape(*shape[:a], -1, *shape[a + 1 :])
-        self._coefficients = values
 
     def _solved(self, strength: float) -> Floats:
         return along_all(self._bases, self._coefficients / (1.0 + strength * self._damping[..., None]))
