@@ -10,7 +10,7 @@ from bvbedit.brdf.base import Brdf
 from bvbedit.brdf.blend import blend
 from bvbedit.brdf.charts import FITTING_CHARTS, Chart, chart_named
 from bvbedit.brdf.encodings import Encoding, encoding_named
-from bvbedit.brdf.fit import THOROUGH_ROUNDS, fit_net, is_published, settle
+from bvbedit.brdf.fit import AUTO, THOROUGH_ROUNDS, fit_net, is_published, settle
 from bvbedit.brdf.losses import Loss, loss_named
 from bvbedit.brdf.metrics import Comparison, compare, estimate
 from bvbedit.brdf.noise import estimate_noise
@@ -30,7 +30,6 @@ from bvbedit.spline.knots import checked_degree
 
 __all__ = ["Comparison", "blend", "compare", "fit", "load", "render", "save"]
 
-AUTO = "auto"
 # What ``encoding="auto"`` tries; ``linear`` is never the best of the three.
 ENCODINGS = ("root", "log")
 # The knee of the error curve is looked for up to so many control points, a file of about 100 KB.
@@ -56,6 +55,7 @@ class _Wish:
     weights: Weights | None
     precision: str
     rounds: int
+    smoothing: float | str | None
     source: str
 
 
@@ -74,6 +74,7 @@ def fit(
     weights: Weights | None = None,
     precision: str = AUTO,
     thorough: bool = False,
+    smoothing: float | str | None = None,
     source: str = "",
     progress: Callable[[float], None] | None = None,
 ) -> SplineBrdf:
@@ -90,8 +91,9 @@ def fit(
     ``metric`` names what is to be small: ``log_cosine_rms``, ``fores`` or ``relative_l1``. ``weights``, a function of
     chart parameters (n, 3) that returns (n,) >= 0, multiplies the weights that follow from it. ``precision``:
     ``quantised`` (``auto``; the step adds about 4 % to the error), ``float16``, ``float32`` or ``float64``.
-    ``thorough`` takes more steps on the metric itself and seconds longer. ``source`` names the data in the report,
-    whose bytes count too.
+    ``smoothing`` penalises differences of the net, for noisy data: a strength, or ``auto`` for the one that generalised
+    cross-validation finds. ``thorough`` takes more steps on the metric itself and seconds longer. ``source`` names the
+    data in the report, whose bytes count too.
 
     ``report`` tells what was tried, the error curve, how sound the model is, and how far from ``brdf``, measured over
     50,000 pairs of each sample set (``report["metrics"]``).
@@ -107,7 +109,7 @@ def fit(
     start = perf_counter()
     if sum(x is not None for x in (size, max_bytes, max_payload, tolerance)) > 1:
         raise BvbError("size, max_bytes, max_payload and tolerance exclude each other. Give one of them.")
-    wish = _checked(chart, encoding, degrees, knots, metric, weights, precision, thorough, source)
+    wish = _checked(chart, encoding, degrees, knots, metric, weights, precision, thorough, smoothing, source)
     for name, bound in (("max_bytes", max_bytes), ("max_payload", max_payload)):
         if bound is not None and (not is_whole(bound) or bound < 1):
             raise BvbError(f"{name} is {shown(bound)}. Give a whole number of bytes.")
@@ -147,7 +149,7 @@ def fit(
         model, curve = _within(brdf, made, wish, samples, budget, count, trials, start, progress)
         return model
     else:
-        curve = error_curve(made, samples, LARGEST_KNEE, features=tolerance is None)
+        curve = error_curve(made, samples, LARGEST_KNEE)
         if tolerance is None:
             model = _settled(brdf, made, knee(curve).size, wish, samples, progress)
         else:
@@ -164,6 +166,7 @@ def _checked(
     weights: Weights | None,
     precision: str,
     thorough: bool,
+    smoothing: float | str | None,
     source: str,
 ) -> _Wish:
     names = FITTING_CHARTS if chart == AUTO else (chart,)
@@ -177,6 +180,8 @@ def _checked(
         raise BvbError(f"{len(checked)} degrees given. Give three, one for each axis.")
     if weights is not None and not callable(weights):
         raise BvbError(f"weights is {shown(weights)}. Give a function of chart parameters (n, 3).")
+    if smoothing is not None and smoothing != AUTO and not is_real_within(smoothing, 0.0, 1e15):
+        raise BvbError(f"smoothing is {shown(smoothing)}. Give a strength in 0 ... 1e15, or {AUTO!r}.")
     return _Wish(
         tuple(chart_named(name) for name in names),
         tuple(encoding_named(name) for name in (ENCODINGS if encoding == AUTO else (encoding,))),
@@ -186,6 +191,7 @@ def _checked(
         weights,
         "quantised" if precision == AUTO else precision,
         THOROUGH_ROUNDS if thorough else 1,
+        smoothing,
         str(source),
     )
 
@@ -210,10 +216,10 @@ def _settled(
     if is_published(chart, encoding, wish.knots):
         model = fit_net(brdf, chart, encoding, size=size, degrees=wish.degrees, knots=wish.knots)
     else:
-        model = settle(brdf, made, size, weights=wish.weights, rounds=wish.rounds, progress=progress)
+        model = _settled_over(brdf, made, size, wish, progress)
     errors = samples.errors_of(model.spline, encoding, wish.loss)
     if wish.knots == "free":
-        freed = settle(brdf, made.freed(size), size, weights=wish.weights, rounds=wish.rounds, progress=progress)
+        freed = _settled_over(brdf, made.freed(size), size, wish, progress)
         better = samples.errors_of(freed.spline, encoding, wish.loss)
         gain = float(np.sqrt(np.prod(better) / max(np.prod(errors), np.finfo(float).tiny)))
         if gain < 1:
@@ -221,6 +227,14 @@ def _settled(
         notes = [*model.report["notes"], f"free knots: {gain:.3g} times the error of dominant points, {_kept(gain)}"]
         model = model.told(notes=notes)
     return model.stored_as(made.storage(wish.precision, errors)).told(knots=wish.knots, source=wish.source)
+
+
+def _settled_over(
+    brdf: Brdf, made: Plan, size: Sequence[int], wish: _Wish, progress: Callable[[float], None] | None
+) -> SplineBrdf:
+    return settle(
+        brdf, made, size, weights=wish.weights, rounds=wish.rounds, smoothing=wish.smoothing, progress=progress
+    )
 
 
 def _kept(gain: float) -> str:

@@ -22,6 +22,7 @@ from bvbedit.spline.adaptive import AxisLines, axis_lines
 from bvbedit.spline.arguments import one_per_axis, shown
 from bvbedit.spline.fitting import FitResult, fit_weighted, loft
 from bvbedit.spline.knots import checked_knots, place_knots
+from bvbedit.spline.smoothing import smooth
 from bvbedit.spline.tensor import TensorSpline
 
 Progress = Callable[[float], None]
@@ -29,6 +30,8 @@ Progress = Callable[[float], None]
 # Conjugate gradient steps on the grid: they unite lofting with the weights and the degenerate faces. The steps on the
 # metric's samples do the rest.
 GRID_STEPS = 8
+# The strength of smoothing that is found by cross-validation.
+AUTO = "auto"
 # Gauss-Newton steps on the metric's samples, and those of a thorough fit.
 ROUNDS = 1
 THOROUGH_ROUNDS = 4
@@ -122,9 +125,14 @@ def settle(
     *,
     weights: Weights | None = None,
     rounds: int = ROUNDS,
+    smoothing: float | str | None = None,
     progress: Progress | None = None,
 ) -> SplineBrdf:
-    """Return the model of ``size`` control points that a plan leads to, with a report."""
+    """Return the model of ``size`` control points that a plan leads to, with a report.
+
+    ``rounds`` Gauss-Newton steps on the metric's samples end the fit, unless ``smoothing`` penalises differences of the
+    net: with a strength, or with the one that cross-validation finds (``AUTO``).
+    """
     return _settle_over(
         brdf,
         made.problem,
@@ -133,6 +141,7 @@ def settle(
         made.degrees,
         weights=weights,
         rounds=rounds,
+        smoothing=smoothing,
         progress=progress,
     )
 
@@ -146,6 +155,7 @@ def _settle_over(
     *,
     weights: Weights | None = None,
     rounds: int = ROUNDS,
+    smoothing: float | str | None = None,
     progress: Progress | None = None,
 ) -> SplineBrdf:
     """Return the model over given full knot vectors: on the grid, then on the metric's own samples."""
@@ -158,6 +168,21 @@ def _settle_over(
         if progress is not None:
             progress(share)
 
+    if smoothing is not None:
+        smoothed, told = smooth(
+            problem.values,
+            problem.weights,
+            axes,
+            knots,
+            degrees,
+            project=project,
+            strength=None if isinstance(smoothing, str) else smoothing,
+            progress=progress,
+        )
+        model = _reported(smoothed, smoothed.spline, problem.table, problem.encoding, "smoothing")
+        strength = {"strength": told.strength, "degrees_of_freedom": told.degrees_of_freedom}
+        notes = [*model.report["notes"], *told.notes]
+        return model.told(metric=problem.loss.name, smoothing=strength, notes=notes)
     first = loft(problem.values, axes, knots, degrees, [x.roots**2 for x in lines])
     result = fit_weighted(
         problem.values,

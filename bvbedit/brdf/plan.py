@@ -73,13 +73,12 @@ class Plan:
                 )
         return tuple(path.of(int(n)) for path, n in zip(self.paths, size, strict=True))
 
-    def walk(self, points: int, *, features: bool = False) -> list[tuple[int, ...]]:
+    def walk(self, points: int) -> list[tuple[int, ...]]:
         """Return growing sizes, from the smallest net to one of at most so many control points.
 
-        With ``features`` no control point is spent that takes away no more than noise would give it.
+        None is spent that takes away no more than it would of noise alone.
         """
-        floors = [FEATURE * float(x.noise.mean()) for x in self.lines] if features else None
-        return allocate(self.paths, points, floors)
+        return allocate(self.paths, points, [FEATURE * float(x.noise.mean()) for x in self.lines])
 
     def freed(self, size: Sequence[int]) -> "Plan":
         """Return the plan with the knots for ``size`` moved freely along each axis, from where they are."""

@@ -42,12 +42,9 @@ class Step:
         return {"size": list(self.size), "grid": float(f"{self.grid:.3g}"), "nodes": float(f"{self.nodes:.3g}")}
 
 
-def error_curve(made: Plan, samples: Samples, most: int, *, features: bool = False) -> list[Step]:
-    """Return the nets on the greedy walk whose control points double, up to ``most``, each lofted and measured.
-
-    With ``features`` the walk ends where only noise is left.
-    """
-    walk = made.walk(most, features=features)
+def error_curve(made: Plan, samples: Samples, most: int) -> list[Step]:
+    """Return the nets on the greedy walk whose control points double, up to ``most``, each lofted and measured."""
+    walk = made.walk(most)
     points = [int(np.prod(size)) for size in walk]
     wanted = FIRST_POINTS * 2.0 ** np.arange(0, np.log2(max(most / FIRST_POINTS, 1.0)) + 1e-9)
     chosen = sorted({int(np.searchsorted(points, min(w, points[-1]))) for w in wanted} | {len(walk) - 1})

@@ -16,6 +16,17 @@ def _three_numbers(_type: Any, tokens: tuple[Token, ...]) -> tuple[int, int, int
 
 
 Size = Annotated[tuple[int, int, int] | None, Parameter(converter=_three_numbers, n_tokens=1, accepts_keys=False)]
+
+
+def _strength(_type: Any, tokens: tuple[Token, ...]) -> float | str:
+    text = tokens[0].value
+    try:
+        return "auto" if text == "auto" else float(text)
+    except ValueError:
+        raise ValueError(f"{text!r} is no strength. Give auto, or a number from 0 up.") from None
+
+
+Smoothing = Annotated[float | str | None, Parameter(converter=_strength, n_tokens=1)]
 Json = Annotated[bool, Parameter(name="--json", negative="")]
 
 
@@ -35,6 +46,7 @@ def fit(
     metric: str = "log_cosine_rms",
     precision: str = "auto",
     thorough: bool = False,
+    smoothing: Smoothing = None,
     explain: Path | None = None,
     as_json: Json = False,
 ) -> None:
@@ -71,6 +83,8 @@ def fit(
         quantised, float16, float32 or float64 control points in the file; auto is quantised.
     thorough
         Take more steps on the metric itself, and some seconds longer.
+    smoothing
+        For noisy data: auto, or a strength from 0 up; how much differences of the net are penalised.
     explain
         A .png or .svg file to plot the error curve to: why the net has the size it has.
     as_json
@@ -100,6 +114,7 @@ def fit(
             metric=metric,
             precision=precision,
             thorough=thorough,
+            smoothing=smoothing,
             source=source.name,
             progress=watch,
         )
@@ -161,7 +176,7 @@ def describe_model(model: Any, file: Path) -> dict[str, Any]:
         "face_spread": face_spread(spline.control, model.chart),
         **{k: told.get(k) for k in ("source", "knots", "condition", "seconds", "notes", "metrics")},
         "soundness": told["soundness"] if "soundness" in told else soundness_of(model),
-        **{k: told[k] for k in ("noise", "tried", "curve") if k in told},
+        **{k: told[k] for k in ("noise", "smoothing", "tried", "curve") if k in told},
     }
 
 

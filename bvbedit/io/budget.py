@@ -19,10 +19,10 @@ from bvbedit.io.bvb import dumps
 BYTES_OF_POINT = {"float16": 5.5, "float32": 11.0, "float64": 22.0, "quantised": 1.9}
 TRIES = 6
 CLOSE_ENOUGH = 0.98
-# Shares of the step that are tried where bytes are left.
+# Shares of the step that are tried where bytes are left, and where they are lacking: beyond the last one, fewer control
+# points are better.
 SMALLER_STEPS = (1 / 8, 1 / 4, 1 / 2)
-# The step of a quantised net may grow by so much before fewer control points are better.
-LARGEST_GROWTH = 1.5
+LARGER_STEPS = (1.05, 1.1, 1.15, 1.2, 1.25, 1.3, 1.4, 1.5)
 # What a report adds to a file, as long as it is not written: the quick fits that estimate a size have none.
 REPORT_BYTES = 1100
 
@@ -85,18 +85,13 @@ def size_within(made: Plan, samples: Samples, budget: int, precision: str, count
 
 def kept_within(model: SplineBrdf, budget: int, count: Bytes) -> SplineBrdf | None:
     """Return ``model`` stored in at most ``budget`` bytes, or None where that would cost more than it is worth."""
+    fits = count(model) <= budget
     step = model.storage.step
-    if count(model) <= budget:
-        # Bytes that control points have no use for make the step smaller.
-        for share in SMALLER_STEPS if step is not None else ():
-            finer = model.stored_as(Storage(model.storage.precision, step * share))
-            if count(finer) <= budget:
-                return finer
-        return model
     if step is None:
-        return None
-    for growth in np.linspace(1.0, LARGEST_GROWTH, 11)[1:]:
-        coarser = model.stored_as(Storage(model.storage.precision, step * float(growth)))
-        if count(coarser) <= budget:
-            return coarser
-    return None
+        return model if fits else None
+    # Bytes that control points have no use for make the step smaller.
+    for share in SMALLER_STEPS if fits else LARGER_STEPS:
+        restored = model.stored_as(Storage(model.storage.precision, step * share))
+        if count(restored) <= budget:
+            return restored
+    return model if fits else None
