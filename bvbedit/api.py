@@ -6,7 +6,7 @@ from time import perf_counter
 
 import numpy as np
 
-from bvbedit.brdf.base import Brdf
+from bvbedit.brdf.base import Brdf, check_brdf
 from bvbedit.brdf.blend import blend
 from bvbedit.brdf.charts import FITTING_CHARTS, Chart, chart_named
 from bvbedit.brdf.encodings import Encoding, encoding_named
@@ -14,7 +14,7 @@ from bvbedit.brdf.fit import AUTO, THOROUGH_ROUNDS, fit_net, is_published, settl
 from bvbedit.brdf.losses import Loss, loss_named
 from bvbedit.brdf.metrics import Comparison, compare, estimate
 from bvbedit.brdf.noise import estimate_noise
-from bvbedit.brdf.plan import Plan, Trial, checked_placement, plan, try_charts
+from bvbedit.brdf.plan import Plan, Trial, checked_degrees, checked_placement, checked_size, plan, try_charts
 from bvbedit.brdf.problem import Weights, tabulate
 from bvbedit.brdf.samples import Samples, draw_samples
 from bvbedit.brdf.sizing import Step, error_curve, knee, points_for, sufficient
@@ -25,8 +25,7 @@ from bvbedit.errors import BvbError
 from bvbedit.io import load, save
 from bvbedit.io.budget import file_bytes, first_guess, kept_within, payload_bytes, size_within
 from bvbedit.render import render
-from bvbedit.spline.arguments import is_real_within, is_whole, one_per_axis, shown
-from bvbedit.spline.knots import checked_degree
+from bvbedit.spline.arguments import is_real_within, is_whole, shown
 
 __all__ = ["Comparison", "blend", "compare", "fit", "load", "render", "save"]
 
@@ -39,6 +38,8 @@ LARGEST_NET = 200_000
 TOLERANCE_TRIES = 6
 # A net that is this much better than a tolerance asks for is tried smaller.
 TOO_GOOD = 0.9
+# Bytes that no model needs.
+LARGEST_BUDGET = 1 << 30
 # Pairs of each set that judge the sizes of nets, others than those of the trials and of the fit.
 JUDGES, JUDGING_SEED = 20_000, 1
 
@@ -107,16 +108,17 @@ def fit(
     0.15915
     """
     start = perf_counter()
+    check_brdf(brdf, "brdf")
     if sum(x is not None for x in (size, max_bytes, max_payload, tolerance)) > 1:
         raise BvbError("size, max_bytes, max_payload and tolerance exclude each other. Give one of them.")
     wish = _checked(chart, encoding, degrees, knots, metric, weights, precision, thorough, smoothing, source)
     for name, bound in (("max_bytes", max_bytes), ("max_payload", max_payload)):
-        if bound is not None and (not is_whole(bound) or bound < 1):
-            raise BvbError(f"{name} is {shown(bound)}. Give a whole number of bytes.")
+        if bound is not None and (not is_whole(bound) or not 1 <= bound <= LARGEST_BUDGET):
+            raise BvbError(f"{name} is {shown(bound)}. Give a whole number of bytes from 1 to {LARGEST_BUDGET:,}.")
     if tolerance is not None and not is_real_within(tolerance, 1e-12, 1e12):
         raise BvbError(f"tolerance is {shown(tolerance)}. Give a number above zero.")
     if size is not None:
-        size = _checked_size(size)
+        size = checked_size(size)
 
     budget = max_bytes if max_bytes is not None else max_payload
     if size is not None:
@@ -151,7 +153,7 @@ def fit(
     else:
         curve = error_curve(made, samples, LARGEST_KNEE)
         if tolerance is None:
-            model = _settled(brdf, made, knee(curve).size, wish, samples, progress)
+            model = _settled(brdf, made, knee(curve, _noise_of(brdf, made)).size, wish, samples, progress)
         else:
             model = _to_tolerance(brdf, made, wish, samples, tolerance, curve, progress)
     return _told(model, brdf, trials, curve, start)
@@ -169,38 +171,37 @@ def _checked(
     smoothing: float | str | None,
     source: str,
 ) -> _Wish:
-    names = FITTING_CHARTS if chart == AUTO else (chart,)
-    if not set(names) <= set(FITTING_CHARTS):
-        chart_named(chart)
+    for name, text in (("precision", precision), ("source", source)):
+        if not isinstance(text, str):
+            raise BvbError(f"{name} is {shown(text)}. Give a text.")
+    if not isinstance(thorough, bool | np.bool_):
+        raise BvbError(f"thorough is {shown(thorough)}. Give True or False.")
+    charts = [chart_named(name) for name in (FITTING_CHARTS if _is_auto(chart) else (chart,))]
+    if charts[0].name not in FITTING_CHARTS:
         raise BvbError(f"Chart {chart!r} is for tables only. Fit in one of {', '.join((AUTO, *FITTING_CHARTS))}.")
     if precision not in (AUTO, *PRECISIONS):
-        raise BvbError(f"Unknown precision {precision!r}. Choose one of {', '.join((AUTO, *PRECISIONS))}.")
-    checked = tuple(checked_degree(p) for p in one_per_axis(degrees, "Degrees"))
-    if len(checked) != 3:
-        raise BvbError(f"{len(checked)} degrees given. Give three, one for each axis.")
+        raise BvbError(f"Unknown precision {shown(precision)}. Choose one of {', '.join((AUTO, *PRECISIONS))}.")
     if weights is not None and not callable(weights):
         raise BvbError(f"weights is {shown(weights)}. Give a function of chart parameters (n, 3).")
-    if smoothing is not None and smoothing != AUTO and not is_real_within(smoothing, 0.0, 1e15):
+    if smoothing is not None and not _is_auto(smoothing) and not is_real_within(smoothing, 0.0, 1e15):
         raise BvbError(f"smoothing is {shown(smoothing)}. Give a strength in 0 ... 1e15, or {AUTO!r}.")
     return _Wish(
-        tuple(chart_named(name) for name in names),
-        tuple(encoding_named(name) for name in (ENCODINGS if encoding == AUTO else (encoding,))),
-        (checked[0], checked[1], checked[2]),
+        tuple(charts),
+        tuple(encoding_named(name) for name in (ENCODINGS if _is_auto(encoding) else (encoding,))),
+        checked_degrees(degrees),
         checked_placement(knots),
         loss_named(metric),
         weights,
         "quantised" if precision == AUTO else precision,
         THOROUGH_ROUNDS if thorough else 1,
         smoothing,
-        str(source),
+        source,
     )
 
 
-def _checked_size(size: Sequence[int]) -> tuple[int, int, int]:
-    numbers = one_per_axis(size, "Size")
-    if len(numbers) != 3 or not all(is_whole(n) and n > 0 for n in numbers):
-        raise BvbError(f"Size {shown(numbers)} is not three whole numbers. Give control points along each axis.")
-    return int(numbers[0]), int(numbers[1]), int(numbers[2])
+def _is_auto(value: object) -> bool:
+    """Return whether ``value`` is the word; an array would compare element by element."""
+    return isinstance(value, str) and value == AUTO
 
 
 def _settled(
@@ -255,7 +256,7 @@ def _within(
     """Return the model that keeps within a budget, its report included."""
     size = size_within(made, samples, budget, wish.precision, count)
     curve = error_curve(made, samples, int(np.prod(size)))
-    size = sufficient(curve).size
+    size = sufficient(curve, _noise_of(brdf, made)).size
     while True:
         model = _told(_settled(brdf, made, size, wish, samples, progress), brdf, trials, curve, start)
         kept = kept_within(model, budget, count)
@@ -265,6 +266,14 @@ def _within(
         if np.prod(smaller) >= np.prod(size):
             raise BvbError(f"{budget} bytes hold no net of degrees {wish.degrees} and its report. Allow more.")
         size = smaller
+
+
+def _noise_of(brdf: Brdf, made: Plan) -> tuple[float, float]:
+    """Return the noise of what errors are measured by, where the chart averages it out of what is fitted."""
+    if not made.problem.chart.reciprocal or made.problem.loss.power != 2:
+        return 0.0, 0.0
+    found = estimate_noise(brdf, made.problem.loss)
+    return found.grid, found.nodes
 
 
 def _to_tolerance(

@@ -67,3 +67,9 @@ class Brdf(ABC):
                 f[block][above], backed = self._evaluate(i[above], o[above])
                 trusted[block][above] = backed & (smaller[above] >= lowest)
         return f, trusted
+
+
+def check_brdf(value: object, name: str) -> None:
+    """Raise BvbError where ``value``, called ``name``, is no Brdf."""
+    if not isinstance(value, Brdf):
+        raise BvbError(f"{name} is {type(value).__name__}, not a Brdf. Give what load() or fit() returned.")

@@ -112,6 +112,12 @@ def encoding_named(name: str) -> Encoding:
     return encoding_from_dict({"name": name})
 
 
+def check_encoding(value: object) -> None:
+    """Raise BvbError where ``value`` is no Encoding."""
+    if not isinstance(value, Encoding):
+        raise BvbError(f"{shown(value)} is no encoding. Give one like Root().")
+
+
 def encoding_from_dict(description: Mapping[str, Any]) -> Encoding:
     """Return the encoding that ``to_dict`` described. Raises BvbError for an unknown name or a bad parameter."""
     if not isinstance(description, Mapping):

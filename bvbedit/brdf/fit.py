@@ -1,5 +1,6 @@
 """Fitting a B-spline volume to any BRDF: a plan, a net by weighted least squares, a few steps on the metric itself."""
 
+import math
 import sys
 from collections.abc import Callable, Sequence
 from time import perf_counter
@@ -7,19 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from bvbedit.brdf.base import Brdf
+from bvbedit.brdf.base import Brdf, check_brdf
 from bvbedit.brdf.charts import IN_OUT, Chart
-from bvbedit.brdf.encodings import Encoding, Linear
+from bvbedit.brdf.encodings import Encoding, Linear, check_encoding
 from bvbedit.brdf.geometry import Floats
 from bvbedit.brdf.losses import loss_named
-from bvbedit.brdf.plan import Plan, checked_placement, plan, try_charts
+from bvbedit.brdf.plan import Plan, checked_degrees, checked_placement, checked_size, plan, try_charts
 from bvbedit.brdf.polish import polish
 from bvbedit.brdf.problem import Problem, Table, Weights, pose, tabulate
 from bvbedit.brdf.samples import draw_samples, samples_for
 from bvbedit.brdf.spline_brdf import SplineBrdf, check_fitting_chart, keep_faces
 from bvbedit.errors import BvbError
 from bvbedit.spline.adaptive import AxisLines, axis_lines
-from bvbedit.spline.arguments import one_per_axis, shown
+from bvbedit.spline.arguments import one_per_axis
 from bvbedit.spline.fitting import FitResult, fit_weighted, loft
 from bvbedit.spline.knots import checked_knots, place_knots
 from bvbedit.spline.smoothing import smooth
@@ -27,9 +28,11 @@ from bvbedit.spline.tensor import TensorSpline
 
 Progress = Callable[[float], None]
 
-# Conjugate gradient steps on the grid: they unite lofting with the weights and the degenerate faces. The steps on the
-# metric's samples do the rest.
-GRID_STEPS = 8
+# Conjugate gradient steps on the grid unite lofting with the weights and the degenerate faces: as many as pass over so
+# many nodes in all, no fewer than FEWEST_STEPS, until they change next to nothing. The steps on the metric's samples do
+# the rest.
+GRID_PASSES = 12_000_000
+FEWEST_STEPS, MOST_STEPS = 8, 100
 # The strength of smoothing that is found by cross-validation.
 AUTO = "auto"
 # Gauss-Newton steps on the metric's samples, and those of a thorough fit.
@@ -58,17 +61,15 @@ def fit_net(
     ``linear``, ``piegl-tiller``) is lofted to the filled table with equal weights and free faces (Lee & Park 2008).
     Raises BvbError where size and degrees do not suit each other or the data.
     """
+    check_brdf(brdf, "brdf")
     check_fitting_chart(chart)
-    size, degrees = one_per_axis(size, "Size"), one_per_axis(degrees, "Degrees")
-    if len(size) != 3 or len(degrees) != 3:
-        raise BvbError(
-            f"Size {shown(size)} and degrees {shown(degrees)} are not three numbers each. Give one for each axis."
-        )
+    check_encoding(encoding)
+    size, degrees = checked_size(size), checked_degrees(degrees)
+    knots, loss = checked_placement(knots), loss_named(metric)
     start = perf_counter()
     if is_published(chart, encoding, knots):
         return _published(brdf, encoding, size, degrees).told(seconds=perf_counter() - start)
-    loss = loss_named(metric)
-    points = int(np.prod([int(n) for n in size]))
+    points = math.prod(size)
     (trial,) = try_charts(brdf, [chart], [encoding], loss, degrees=degrees, points=points, weights=weights)
     made = plan(
         tabulate(brdf, chart),
@@ -76,7 +77,7 @@ def fit_net(
         loss,
         trial.balance,
         degrees=degrees,
-        placement=checked_placement(knots),
+        placement=knots,
         points=max(size) ** 3,
         weights=weights,
     )
@@ -106,11 +107,16 @@ def fit_over(
 
     Raises BvbError where the knots or degrees are none, or ask for more control points than the grid has nodes.
     """
+    check_brdf(brdf, "brdf")
     check_fitting_chart(chart)
+    check_encoding(encoding)
     start = perf_counter()
     loss = loss_named(metric)
-    vectors = tuple(checked_knots(t, p) for t, p in zip(knots, degrees, strict=True))
-    points = int(np.prod([len(t) - p - 1 for t, p in zip(vectors, degrees, strict=True)]))
+    given, degrees = one_per_axis(knots, "Knots"), checked_degrees(degrees)
+    if len(given) != 3:
+        raise BvbError(f"{len(given)} knot vectors given. Give three, one for each axis.")
+    vectors = tuple(checked_knots(t, p) for t, p in zip(given, degrees, strict=True))
+    points = math.prod(len(t) - p - 1 for t, p in zip(vectors, degrees, strict=True))
     (trial,) = try_charts(brdf, [chart], [encoding], loss, degrees=degrees, points=points)
     problem = pose(tabulate(brdf, chart), encoding, loss, trial.balance)
     lines = axis_lines(problem.values, problem.weights, problem.table.axes)
@@ -164,14 +170,20 @@ def _settle_over(
     def project(control: Floats) -> Floats:
         return keep_faces(control, chart)
 
+    done = 0.0
+
     def report(share: float) -> None:
+        nonlocal done
+        done = max(done, float(share))
         if progress is not None:
-            progress(share)
+            progress(done)
 
     if smoothing is not None:
+        # What is held is no datum: the penalty bridges nodes without data.
+        known = np.any(np.stack(problem.table.trusted), axis=0)
         smoothed, told = smooth(
             problem.values,
-            problem.weights,
+            np.where(known, problem.weights, 0.0),
             axes,
             knots,
             degrees,
@@ -192,7 +204,7 @@ def _settle_over(
         degrees,
         start=first.spline.control,
         project=project,
-        max_iterations=GRID_STEPS,
+        max_iterations=int(np.clip(GRID_PASSES // problem.weights.size, FEWEST_STEPS, MOST_STEPS)),
         progress=lambda share: report(share / (1 + rounds)),
     )
     samples = draw_samples(brdf, chart, samples_for(result.spline.control.size // 3), weights=weights)
@@ -206,6 +218,7 @@ def _settle_over(
         rounds=rounds,
         progress=lambda share: report((1 + rounds * share) / (1 + rounds)),
     )
+    report(1.0)
     return _reported(first, spline, problem.table, problem.encoding, "metric").told(metric=problem.loss.name)
 
 

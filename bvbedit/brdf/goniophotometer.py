@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from bvbedit.brdf.base import Brdf
+from bvbedit.brdf.base import Brdf, check_brdf
 from bvbedit.brdf.charts import HALF_DIFF, IN_OUT, RUSINKIEWICZ, Chart, grid_points
 from bvbedit.brdf.geometry import Floats
 from bvbedit.brdf.measured import MeasuredBrdf
@@ -62,8 +62,9 @@ def measure(brdf: Brdf, grid: str = "merl", noise: float = 0.0, seed: int = 0) -
     negative value would mark an invalid cell in a MERL file: in the dark the mean is therefore a little too high.
     ``seed`` >= 0 chooses the readings (PCG64); the same seed gives the same table.
 
-    Raises BvbError for an unknown grid, noise outside [0, 1] or a seed that is not a whole number >= 0.
+    Raises BvbError for no Brdf, an unknown grid, noise outside [0, 1] or a seed that is not a whole number >= 0.
     """
+    check_brdf(brdf, "brdf")
     if not isinstance(grid, str) or grid not in GRIDS:
         raise BvbError(f"Unknown grid {shown(grid)}. Choose one of {', '.join(GRIDS)}.")
     if not is_real_within(noise, 0, 1):

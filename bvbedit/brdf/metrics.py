@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from bvbedit.brdf.base import Brdf
+from bvbedit.brdf.base import Brdf, check_brdf
 from bvbedit.brdf.geometry import Floats, spherical
 from bvbedit.brdf.sample_sets import HIGHEST_ELEVATION, HORIZON_MARGIN, LARGEST_REFLECTANCE, MARGIN, draw, node_blocks
 from bvbedit.errors import BvbError
@@ -83,8 +83,10 @@ def compare(a: Brdf, b: Brdf, *, stride: int = 1, progress: Callable[[float], No
     The nodes are the valid ones of ``b`` where it is a MERL table, else all MERL nodes with phi_d in steps of 2
     degrees; both elevations under 80 degrees. A ``stride`` (a divisor of 45) takes every so many-th node of each axis
     only: 5 is a hundred times quicker and tells the means to a few percent. ``progress`` is called with the share done.
-    Raises BvbError for another stride.
+    Raises BvbError for another stride, and what is no Brdf.
     """
+    check_brdf(a, "a")
+    check_brdf(b, "b")
     if not is_whole(stride) or stride not in STRIDES:
         raise BvbError(f"stride is {shown(stride)}. Choose one of {', '.join(map(str, STRIDES))}.")
     grid, nodes = _Sums(), _Sums()

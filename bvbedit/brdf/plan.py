@@ -25,14 +25,16 @@ from bvbedit.spline.adaptive import (
     marginals,
     placed_knots,
 )
-from bvbedit.spline.arguments import shown
+from bvbedit.spline.arguments import is_whole, one_per_axis, shown
 from bvbedit.spline.fitting import loft
 from bvbedit.spline.free_knots import move_knots
-from bvbedit.spline.knots import PLACEMENTS
+from bvbedit.spline.knots import PLACEMENTS, checked_degree
 from bvbedit.spline.tensor import TensorSpline
 
 # Placements that look at the data; "free" moves the knots of "dominant".
 ADAPTIVE = ("dominant", "free")
+# No table has as many nodes by far.
+MOST_POINTS = 1 << 24
 # An axis is tried with up to so many control points for the cube root of the net's, and a few.
 ELONGATION = 4.0
 FEW = 20
@@ -47,6 +49,8 @@ FEATURE = 2.0
 # Pairs of each set that judge a trial.
 TRIAL_SAMPLES = 20_000
 UNSURE = 0.1
+# An error below this share of the other set's counts as so large.
+SMALLEST_ERROR = 1e-6
 # Turns in which the sets are balanced: one set may gain much where the other loses little.
 BALANCING = 4
 
@@ -189,6 +193,27 @@ def plan(
     return Plan(problem, (p0, p1, p2), lines, paths)
 
 
+def checked_size(size: object) -> tuple[int, int, int]:
+    """Return ``size``. Raises BvbError where it is no three whole numbers above zero, or more than any net has."""
+    numbers = one_per_axis(size, "Size")
+    if len(numbers) != 3 or not all(is_whole(n) and n > 0 for n in numbers):
+        raise BvbError(
+            f"Size {shown(numbers)} is not three whole numbers above zero. Give control points along each axis."
+        )
+    n0, n1, n2 = (int(n) for n in numbers)
+    if n0 * n1 * n2 > MOST_POINTS:
+        raise BvbError(f"A net of size {shown(numbers)} is too large. Keep within {MOST_POINTS:,} control points.")
+    return n0, n1, n2
+
+
+def checked_degrees(degrees: object) -> tuple[int, int, int]:
+    """Return ``degrees``. Raises BvbError where they are no three degrees."""
+    numbers = [checked_degree(p) for p in one_per_axis(degrees, "Degrees")]
+    if len(numbers) != 3:
+        raise BvbError(f"{len(numbers)} degrees given. Give three, one for each axis.")
+    return numbers[0], numbers[1], numbers[2]
+
+
 def checked_placement(name: object) -> str:
     """Return ``name``. Raises BvbError where it places no knots."""
     if not isinstance(name, str) or name not in (*ADAPTIVE, *PLACEMENTS):
@@ -246,5 +271,9 @@ def try_charts(
 
 def balance_of(errors: Floats) -> tuple[float, float]:
     """Return what an error over each set counts, so that both fall by the same share: the inverse squares."""
-    inverse = 1.0 / np.maximum(errors, max(1e-6 * errors.max(), np.finfo(float).tiny)) ** 2
-    return float(inverse[0] / inverse.max()), float(inverse[1] / inverse.max())
+    largest = float(errors.max())
+    if not largest > 0:
+        return 1.0, 1.0
+    relative = np.maximum(errors / largest, SMALLEST_ERROR)
+    inverse = (relative.min() / relative) ** 2
+    return float(inverse[0]), float(inverse[1])

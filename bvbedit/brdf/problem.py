@@ -17,6 +17,7 @@ from bvbedit.brdf.losses import Loss
 from bvbedit.brdf.measured import MeasuredBrdf, hold
 from bvbedit.brdf.sample_sets import HIGHEST_ELEVATION, HORIZON_MARGIN, LARGEST_REFLECTANCE, densities, draw
 from bvbedit.errors import BvbError
+from bvbedit.spline.arguments import real_array, shown
 
 Weights = Callable[[Floats], Floats]
 
@@ -28,11 +29,11 @@ ROUNDING = 1e-12
 # Densities on the faces of a chart are taken so much of a node's distance inside.
 INSIDE = 0.5
 # Where no sample set looks (beyond 80 degrees), the density that keeps the model at the data, of the sets' mean. With
-# 1e-3 models of 48 KiB reached 1e5 /sr there and E_avg rose to 476; from 3e-2 on it is 0.003 ... 0.16, and as nets with
-# tame values are stored in fewer bytes, the metric falls too (0.523 to 0.472 of the paper's for gold paint on `grid`).
-BEYOND = 3e-2
+# 1e-3 models of 48 KiB reached 1e5 /sr there, E_avg rose to 476, and lobes grew spikes at grazing; with 0.1 it is 0.002
+# ... 0.17. More costs the metric: with 1 gold paint has 1.35 times the error, as a mean of `grid` and `nodes`.
+BEYOND = 0.1
 # The same at nodes without data, their value held from the nearest node with data.
-HELD = 3e-3
+HELD = 0.1
 
 
 @dataclass(frozen=True)
@@ -210,22 +211,26 @@ def pose(
     density = np.where(known, density, HELD * mean)
     if weights is not None:
         density = density * checked_weights(weights, grid_points(table.axes)).reshape(shape)
+        if not density.any():
+            raise BvbError("weights are zero at all nodes. Return numbers above zero where the model is to be good.")
     f = encoding.decode(values)
     slope = loss.slope(f, *table.cosines) * encoding.slope(values)
     if loss.power != 2:
         slope = slope * np.sqrt(loss.reweighting(loss.expected(f, *table.cosines)))
     squared = np.einsum("...c,...c->...", slope, slope) / 3
     # Where all channels are black their slope may be zero: the model is to be black there too.
-    squared = np.maximum(squared, 1e-9 * squared.max())
+    squared = np.maximum(squared, 1e-9 * squared.max()) if squared.any() else np.ones_like(squared)
     return Problem(table, encoding, loss, (float(balance[0]), float(balance[1])), values, density * squared, variance)
 
 
 def checked_weights(weights: Weights, points: Floats) -> Floats:
-    """Return ``weights(points)`` (n,). Raises BvbError where that is no row of finite numbers >= 0, not all zero."""
-    found = np.asarray(weights(points), dtype=np.float64)
-    if found.shape != (len(points),) or not np.isfinite(found).all() or found.min() < 0 or not found.any():
+    """Return ``weights(points)`` (n,). Raises BvbError where that is no row of finite numbers >= 0."""
+    if not callable(weights):
+        raise BvbError(f"weights is {shown(weights)}. Give a function of chart parameters (n, 3).")
+    found = real_array(weights(points), "Weights")
+    if found.shape != (len(points),) or not np.isfinite(found).all() or (found < 0).any():
         raise BvbError(
-            f"weights returned shape {found.shape} for {len(points):,} points. "
-            "Return finite numbers >= 0, one for each point (n, 3), not all zero."
+            f"weights returned {shown(found)} for {len(points):,} points. "
+            "Return finite numbers >= 0, one for each point (n, 3)."
         )
     return found

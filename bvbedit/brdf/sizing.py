@@ -15,6 +15,8 @@ FIRST_POINTS = 125
 WORTH_DOUBLING = 0.15
 # Errors that differ by less are the same.
 AS_GOOD = 0.02
+# What is left of an error when noise is taken away is not certain to better than this share of it.
+CERTAIN = 0.1
 
 
 @dataclass(frozen=True)
@@ -32,10 +34,10 @@ class Step:
         """The number of control points."""
         return int(np.prod(self.size))
 
-    @property
-    def score(self) -> float:
-        """The geometric mean of the metric over both sets."""
-        return float(np.sqrt(self.grid * self.nodes))
+    def score(self, noise: tuple[float, float] = (0.0, 0.0)) -> float:
+        """Return the geometric mean of the metric over both sets, without the ``noise`` of what it is measured by."""
+        signal = [max(e * e - n * n, (CERTAIN * e) ** 2) for e, n in zip((self.grid, self.nodes), noise, strict=True)]
+        return float((signal[0] * signal[1]) ** 0.25)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures with three digits."""
@@ -58,19 +60,22 @@ def step_of(made: Plan, samples: Samples, size: tuple[int, ...]) -> Step:
     return Step(size, *samples.metrics(errors, problem.loss))
 
 
-def knee(curve: list[Step]) -> Step:
-    """Return the smallest net beyond which no doubling of the control points takes away ``WORTH_DOUBLING``."""
+def knee(curve: list[Step], noise: tuple[float, float] = (0.0, 0.0)) -> Step:
+    """Return the smallest net beyond which no doubling of the control points takes away ``WORTH_DOUBLING``.
+
+    ``noise``: standard deviations over both sets of the data that the nets were measured by.
+    """
     for step, larger in reversed(list(pairwise(curve))):
         doublings = np.log2(larger.points / step.points)
-        if larger.score < step.score * (1 - WORTH_DOUBLING) ** doublings:
+        if larger.score(noise) < step.score(noise) * (1 - WORTH_DOUBLING) ** doublings:
             return larger
     return curve[0]
 
 
-def sufficient(curve: list[Step]) -> Step:
+def sufficient(curve: list[Step], noise: tuple[float, float] = (0.0, 0.0)) -> Step:
     """Return the smallest net that is as good as the best one, up to ``AS_GOOD``: no control points without effect."""
-    best = min(step.score for step in curve)
-    return next(step for step in curve if step.score <= (1 + AS_GOOD) * best)
+    best = min(step.score(noise) for step in curve)
+    return next(step for step in curve if step.score(noise) <= (1 + AS_GOOD) * best)
 
 
 def points_for(curve: list[Step], tolerance: float) -> int:

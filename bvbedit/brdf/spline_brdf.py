@@ -8,7 +8,7 @@ import numpy as np
 
 from bvbedit.brdf.base import Brdf
 from bvbedit.brdf.charts import FITTING_CHARTS, Chart
-from bvbedit.brdf.encodings import Encoding
+from bvbedit.brdf.encodings import Encoding, check_encoding
 from bvbedit.brdf.geometry import Bools, Floats
 from bvbedit.brdf.storage import FLOAT32, Storage
 from bvbedit.errors import BvbError
@@ -22,7 +22,7 @@ class SplineBrdf(Brdf):
     ``spline`` has three parameters on [0, 1] and three channels. ``report`` tells how the model was fitted, as JSON
     can hold it; an edited model (``with_spline``) has none, since it would no longer be true. ``storage`` is how a file
     holds the control points, unless another way is asked for; here they are as exact as they came.
-    Raises BvbError for a spline of another shape or domain, for charts that only tables have, and no ``Storage``.
+    Raises BvbError for a spline of another shape or domain, charts that only tables have, no Encoding, no Storage.
     """
 
     reliable_elevation = float(np.pi / 2)
@@ -39,6 +39,7 @@ class SplineBrdf(Brdf):
         if spline.parameters != 3 or spline.channels != 3 or spline.domain != ((0.0, 1.0),) * 3:
             raise BvbError(f"{spline!r} on {spline.domain} is no BRDF. Give 3 parameters on [0, 1] and 3 channels.")
         check_fitting_chart(chart)
+        check_encoding(encoding)
         if not isinstance(storage, Storage):
             raise BvbError(f"{shown(storage)} is no way to store a net. Give one like Storage('float16').")
         self.spline = spline
@@ -73,7 +74,9 @@ class SplineBrdf(Brdf):
 
 
 def check_fitting_chart(chart: Chart) -> None:
-    """Raise BvbError for a chart that only tables have."""
+    """Raise BvbError for a chart that only tables have, and for no chart."""
+    if not isinstance(chart, Chart):
+        raise BvbError(f"{shown(chart)} is no chart. Give what chart_named() returns.")
     if chart.name not in FITTING_CHARTS:
         raise BvbError(f"Chart {chart.name!r} is for tables only. A model lives in {' or '.join(FITTING_CHARTS)}.")
 

@@ -35,14 +35,15 @@ def plot_curve(model: Any, source: str, target: Path) -> None:
         )
     axes.axvline(float(np.prod(size)), color="0.7", linewidth=1, zorder=0)
     axes.set(xscale="log", yscale="log", xlabel="control points", ylabel=metric.replace("_", " "))
-    tried = ", ".join(f"{t['chart']} {t['encoding']} {np.sqrt(t['grid'] * t['nodes']):.3g}" for t in told["tried"])
+    tried = "\n".join(f"{t['chart']} {t['encoding']}: {np.sqrt(t['grid'] * t['nodes']):.3g}" for t in told["tried"])
+    axes.annotate(
+        f"tried, mean of both\n{tried}", (0.98, 0.97), xycoords="axes fraction", ha="right", va="top", fontsize=9
+    )
     axes.set_title(
-        f"{source}: {model.chart.name}, {model.encoding.name}, {' x '.join(map(str, size))} control points\n"
-        f"tried (geometric mean of the errors): {tried}",
-        fontsize=10,
+        f"{source}: {model.chart.name}, {model.encoding.name}, {' x '.join(map(str, size))} control points", fontsize=11
     )
     axes.grid(True, which="both", color="0.92")
-    axes.legend(frameon=False)
+    axes.legend(frameon=False, loc="lower left")
     with replacing(target) as stream:
         figure.savefig(stream, format=target.suffix[1:].lower(), dpi=120)
     pyplot.close(figure)

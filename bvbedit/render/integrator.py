@@ -14,7 +14,7 @@ from os import PathLike, fspath
 import numpy as np
 from numpy.typing import NDArray
 
-from bvbedit.brdf.base import Brdf
+from bvbedit.brdf.base import Brdf, check_brdf
 from bvbedit.errors import BvbError
 from bvbedit.render.named_scenes import scene_named, scene_with_environment
 from bvbedit.render.scene import Scene
@@ -49,8 +49,7 @@ def render(
     Raises BvbError for anything that is not a Brdf, unknown scenes, sizes outside 1 to 8192, spp outside 1 to 65536,
     and materials whose values are not finite.
     """
-    if not isinstance(model, Brdf):
-        raise BvbError(f"model is {type(model).__name__}, not a Brdf. Give what load() or fit() returned.")
+    check_brdf(model, "model")
     width, height = _integer(width, "width", 1, MAX_SIDE), _integer(height, "height", 1, MAX_SIDE)
     spp, seed = _integer(spp, "spp", 1, MAX_SPP), _integer(seed, "seed", 0, 2**63 - 1)
     stage = _scene(scene)

@@ -75,7 +75,7 @@ def choose_strength(
     searched on a logarithmic grid, from no smoothing to multilinear functions, and then by a golden section.
 
     The noise of neighbouring data is taken to be independent: errors that hang together are seen as features.
-    Raises BvbError as ``smooth`` does. Source: Craven & Wahba (1979), equation 1.9.
+    Raises BvbError as ``smooth`` does. Source: Craven & Wahba (1979).
     """
     values, parameters, knots, degrees = _checked_data(values, parameters, knots, degrees)
     problem = _Problem(values, _checked_weights(weights, values.shape[:-1]), parameters, knots, degrees)
@@ -101,7 +101,8 @@ def smooth(
     ``values`` (m_1, ..., m_d, c), ``weights`` (m_1, ..., m_d) >= 0, the d axes ``parameters`` (m_a,) and ``knots`` as
     for ``fit_weighted``, and ``start``, ``project``, ``tolerance`` and ``max_iterations`` too; without a start it is
     the solution for the product of the weights' marginals. ``strength`` is in 0 ... 1e15, or chosen by
-    ``choose_strength``.
+    ``choose_strength``. Where weights are far below that product the penalty alone continues the spline, which takes
+    long to settle: the default tolerance is reached in 1 to 40 iterations, when the fit of the other data is final.
 
     D_a are the ``second_differences`` of the net along axis a; |.|^2 sums over the lines along that axis through the
     nodes of the others, weighed by their marginals (Wood, 2006, "Low-rank scale-invariant tensor product smooths"; the

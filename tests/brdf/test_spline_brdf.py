@@ -8,7 +8,7 @@ import pytest
 from bvbedit import BvbError
 from bvbedit.brdf.charts import HALF_DIFF, IN_OUT, RUSINKIEWICZ, Chart
 from bvbedit.brdf.encodings import Encoding, Linear, Log, Root
-from bvbedit.brdf.spline_brdf import SplineBrdf, face_spread, keep_faces, payload_bytes
+from bvbedit.brdf.spline_brdf import SplineBrdf, face_spread, keep_faces
 from bvbedit.brdf.storage import Storage
 from bvbedit.spline.knots import clamped
 from bvbedit.spline.tensor import TensorSpline
@@ -58,14 +58,6 @@ def test_what_is_no_brdf_is_refused(rng):
     ):
         with pytest.raises(BvbError, match="is no BRDF"):
             SplineBrdf(bad, IN_OUT, Linear())
-
-
-@pytest.mark.parametrize(("precision", "item"), [("float16", 2), ("float32", 4), ("float64", 8)])
-def test_the_payload_is_the_net_and_the_interior_knots(precision, item):
-    assert payload_bytes((10, 6, 4), (3, 3, 3), precision) == 10 * 6 * 4 * 3 * item + (6 + 2) * 8
-    assert payload_bytes((4, 2, 1), (3, 1, 0), precision) == 4 * 2 * 3 * item
-    with pytest.raises(BvbError, match="quantised net has no bytes before it is fitted"):
-        payload_bytes((10, 6, 4), (3, 3, 3), "quantised")
 
 
 def test_a_model_is_stored_in_one_way_however_it_is_edited(rng):

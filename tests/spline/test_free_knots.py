@@ -2,7 +2,7 @@
 
 import subprocess
 import sys
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
@@ -21,6 +21,10 @@ U = np.linspace(0, 1, 91)
 PEAKS = {"gauss": np.exp(-(((U - 0.37) / 0.05) ** 2)), "lorentz": 1 / (1 + ((U - 0.37) / 0.02) ** 2)}
 
 
+def _made(u: np.ndarray, factor: np.ndarray, roots: np.ndarray) -> AxisLines:
+    return AxisLines(u, factor, roots, np.zeros(len(u)))
+
+
 def _lines(values: np.ndarray, u: np.ndarray = U) -> AxisLines:
     return axis_lines(values.reshape(len(u), -1), np.ones(len(u)), [u])[0]
 
@@ -28,13 +32,15 @@ def _lines(values: np.ndarray, u: np.ndarray = U) -> AxisLines:
 def _random(rng: np.random.Generator, m: int, k: int) -> AxisLines:
     """Return random lines with weights over four decades on uneven nodes."""
     u = np.cumsum(rng.uniform(0.5, 1.5, m))
-    return AxisLines((u - u[0]) / (u[-1] - u[0]), rng.normal(size=(m, k)), 10.0 ** rng.uniform(-2, 0, m))
+    return _made((u - u[0]) / (u[-1] - u[0]), rng.normal(size=(m, k)), 10.0 ** rng.uniform(-2, 0, m))
 
 
 def _scaled_condition(lines: AxisLines, knots: np.ndarray, degree: int) -> float:
     """Return the norm of the inverse of the weighted collocation matrix with columns of length one."""
     dense = lines.roots[:, None] * naive.matrix(knots, degree, lines.parameters)
-    return float(1 / np.linalg.svd(dense / np.linalg.norm(dense, axis=0), compute_uv=False)[-1])
+    lengths = np.linalg.norm(dense, axis=0)
+    smallest = np.linalg.svd(dense / lengths, compute_uv=False)[-1] if lengths.all() else 0.0
+    return float(1 / smallest) if smallest > 0 else np.inf
 
 
 @st.composite
@@ -80,7 +86,7 @@ def test_the_gradient_is_that_of_finite_differences(problem):
 
 @given(_problems(), st.integers(0, 100))
 def test_the_slopes_of_gaps_are_those_of_finite_differences(problem, seed):
-    lines, knots, p = problem
+    _, knots, p = problem
     gaps = free_knots._Gaps(knots, p, 1 / 39)
     rng = np.random.default_rng(seed)
     x, by_knot = gaps.x + rng.normal(size=len(gaps.x)), rng.normal(size=len(gaps.x) - 1)
@@ -136,9 +142,8 @@ def test_knots_of_a_spline_are_found_again(degree, seed):
 
 
 def test_a_kink_is_found_by_knots_that_move_as_one():
-    y = np.abs(U - 0.456) + np.sin(3 * U)
     start = clamped([0.3, 0.5, 0.5, 0.5, 0.7], 3)
-    result = move_knots(_lines(y), start, 3)
+    result = move_knots(_lines(np.abs(U - 0.456) + U**2), start, 3)
     assert np.unique(result.knots, return_counts=True)[1].tolist() == [4, 1, 3, 1, 4]
     assert result.knots[5] == pytest.approx(0.456, abs=1e-3)
     assert result.error < 1e-4 * result.start_error
@@ -166,7 +171,7 @@ def test_dominant_points_are_never_spoilt(peak, size, rng):
     assert result.error <= path.error_of(size) * (1 + 1e-12)
 
 
-def _between(lines: AxisLines, values: np.ndarray, knots: np.ndarray) -> float:
+def _between(values: np.ndarray, knots: np.ndarray) -> float:
     """Return how far the spline fitted to values (m,) is at worst from what lies between them."""
     matrix = naive.matrix(knots, 3, U)
     x = np.linspace(0, 1, 901)
@@ -179,12 +184,12 @@ def test_nothing_runs_wild_between_the_data(rng, monkeypatch):
     wild = 0.0
     for size in (20, 40, 60):
         start = dominant_knots(lines, 3, size).of(size)
-        before = _between(lines, values, start)
-        assert _between(lines, values, move_knots(lines, start, 3).knots) < 1.5 * before
+        before = _between(values, start)
+        assert _between(values, move_knots(lines, start, 3).knots) < 1.5 * before
         with monkeypatch.context() as limits:
             for name, value in {"LEAST_GAP": 0.02, "KEPT": 0.01, "CONDITION_GROWTH": np.inf}.items():
                 limits.setattr(free_knots, name, value)
-            wild = max(wild, _between(lines, values, move_knots(lines, start, 3).knots) / before)
+            wild = max(wild, _between(values, move_knots(lines, start, 3).knots) / before)
     # This is what the limits are for.
     assert wild > 10
 
@@ -253,13 +258,13 @@ def test_deterministic():
 def test_knots_do_not_depend_on_the_scale_of_the_data(exponent):
     """Squares of such data leave the range of float64."""
     lines, start = _lines(PEAKS["lorentz"]), place_knots("averaged", U, 14, 3)
-    scaled = AxisLines(lines.parameters, np.ldexp(lines.factor, exponent), lines.roots)
+    scaled = replace(lines, factor=np.ldexp(lines.factor, exponent))
     np.testing.assert_array_equal(move_knots(scaled, start, 3).knots, move_knots(lines, start, 3).knots)
 
 
 def test_knots_do_not_depend_on_the_domain():
     lines = _lines(PEAKS["lorentz"])
-    far = AxisLines(1e3 + 64 * U, lines.factor, lines.roots)
+    far = replace(lines, parameters=1e3 + 64 * U)
     near = move_knots(lines, place_knots("averaged", U, 14, 3), 3, evaluations=30)
     result = move_knots(far, place_knots("averaged", far.parameters, 14, 3), 3, evaluations=30)
     np.testing.assert_allclose((result.knots - 1e3) / 64, near.knots, rtol=0, atol=1e-5)
@@ -288,15 +293,18 @@ class _Breaking(AxisLines):
         return matrix
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf, 0.0, 1e200])
+def _broken(lines: AxisLines, value: float, every: int = 1) -> _Breaking:
+    return _Breaking(lines.parameters, lines.factor, lines.roots, lines.noise, value, every)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_knots_without_a_value_are_never_the_result(value):
     """NLopt takes nan for a success after one evaluation."""
     lines, start = _lines(PEAKS["gauss"]), place_knots("averaged", U, 40, 3)
-    always = move_knots(_Breaking(lines.parameters, lines.factor, lines.roots, value), start, 3)
-    if value != 1e200:
-        np.testing.assert_array_equal(always.knots, start)
-    assert always.error <= always.start_error
-    sometimes = _Breaking(lines.parameters, lines.factor, lines.roots, value, every=4)
+    always = move_knots(_broken(lines, value), start, 3)
+    np.testing.assert_array_equal(always.knots, start)
+    assert always.error == always.start_error == pytest.approx(lines.error(start, 3), rel=1e-9)
+    sometimes = _broken(lines, value, every=4)
     result = move_knots(sometimes, start, 3)
     assert len(sometimes.calls) > 4
     assert result.error <= result.start_error
@@ -357,19 +365,16 @@ def test_what_callers_raise_comes_out(kind, door):
         move_knots(_lines(PEAKS["gauss"]), place_knots("averaged", U, 14, 3), 3, **{door: raising})
 
 
-NOT_FINITE = AxisLines(U, np.full((91, 2), np.nan), np.ones(91))
-
-
 @pytest.mark.parametrize(
     ("changes", "match"),
     [
-        ({"knots": [0, 0, 0.5, 1, 1]}, "clamped"),
+        ({"knots": [0, 0, 0, 0, 0.5, 1, 1, 1]}, "clamped"),
         ({"knots": clamped([0.2], 3, 0.0, 0.9)}, "lie outside the knots"),
         ({"knots": clamped([0.2], 3, 0.1, 1.0)}, "lie outside the knots"),
         ({"knots": clamped([0.501, 0.502, 0.503, 0.504, 0.505, 0.506], 3)}, "do not determine 10 control points"),
         ({"knots": clamped(np.linspace(0, 1, 100)[1:-1], 3)}, "do not determine 102 control points"),
-        ({"lines": NOT_FINITE}, "not finite"),
-        ({"lines": AxisLines(U, np.full((91, 2), np.inf), np.ones(91))}, "not finite"),
+        ({"lines": _made(U, np.full((91, 2), np.nan), np.ones(91))}, "not finite"),
+        ({"lines": _made(U, np.full((91, 2), np.inf), np.ones(91))}, "not finite"),
         ({"degree": 17}, "17"),
         ({"evaluations": 0}, "0 evaluations"),
         ({"evaluations": 1.5}, "1.5 evaluations"),
