@@ -1,4 +1,4 @@
-"""The Python surface: what it refuses before any work is done."""
+"""The Python surface: what it refuses."""
 
 import pytest
 

@@ -163,6 +163,8 @@ def _sidedness(brdf: Brdf, which: int) -> tuple[float, float]:
     wi, wo = pairs.wi[part], pairs.wo[part]
     cross = wi[:, 0] * wo[:, 1] - wi[:, 1] * wo[:, 0]
     left, right = np.count_nonzero(cross > HORIZON_MARGIN), np.count_nonzero(cross < -HORIZON_MARGIN)
+    if left + right == 0:  # tables with large holes may leave a set without a pair
+        return 0.5, 0.5
     return left / (left + right), right / (left + right)
 
 

@@ -13,8 +13,8 @@ from bvbedit.brdf.encodings import Encoding, Linear, Log, Root
 from bvbedit.brdf.fit import fit_net
 from bvbedit.brdf.geometry import spherical
 from bvbedit.brdf.goniophotometer import measure
-from bvbedit.brdf.materials import material_named
 from bvbedit.brdf.losses import loss_named
+from bvbedit.brdf.materials import material_named
 from bvbedit.brdf.measured import MeasuredBrdf
 from bvbedit.brdf.problem import pose, tabulate
 from bvbedit.brdf.sample_sets import LARGEST_REFLECTANCE
@@ -65,7 +65,8 @@ each_half_diff_model = pytest.mark.parametrize(
 
 
 def _relative_spread(f: np.ndarray) -> float:
-    return float((np.ptp(f, axis=0) / f.max(axis=0)).max())
+    """Return the largest spread of a channel, relative to its value; what is darker than 1e-3 counts as that."""
+    return float((np.ptp(f, axis=0) / np.maximum(f.max(axis=0), 1e-3)).max())
 
 
 @each_half_diff_model
@@ -170,7 +171,7 @@ def test_cells_near_grazing_have_no_influence_either(rng):
         models.append(fit_net(table, IN_OUT, Root(), size=(8, 8, 8)))
     wi, wo = random_pairs(rng, 5000, np.radians(80))
     first, second = (m.evaluate(wi, wo) for m in models)
-    np.testing.assert_allclose(first, second, rtol=0, atol=2e-3 * first.max())
+    np.testing.assert_allclose(first, second, rtol=0, atol=1e-12 * first.max())
     assert models[0].report["without_data"] == pytest.approx(grazing.mean())
 
 
@@ -181,13 +182,13 @@ def test_beyond_the_data_a_model_stays_near_the_held_values(rng):
     wi = spherical(rng.uniform(0, np.pi / 2, 20_000), 0.0)
     wo = spherical(rng.uniform(np.radians(85), np.radians(89.9), 20_000), rng.uniform(0, 2 * np.pi, 20_000))
     fitted, held = (np.linalg.norm(b.evaluate(wi, wo), axis=1) + 1e-3 for b in (model, table))
-    assert (fitted / held).max() < 20
+    assert (fitted / held).max() < 15
 
 
 @pytest.mark.parametrize("encoding", [Root(), Log(), Linear()], ids=repr)
 @pytest.mark.parametrize("chart", [IN_OUT, HALF_DIFF], ids=lambda c: c.name)
 def test_a_model_fitted_in_its_own_space_comes_back(chart, encoding, rng):
-    """Up to the 1e-4 rad from which the horizon is looked at, and the tolerance of the iteration."""
+    """Up to the 1e-4 rad from which the horizon is looked at, and the steps that are left out for speed."""
     size = (8, 7, 6)
     knots = [place_knots("averaged", u, n, 3) for u, n in zip(chart.fitting_grid, size, strict=True)]
     control = rng.uniform(0.5, 1.5, (*size, 3))
@@ -198,11 +199,11 @@ def test_a_model_fitted_in_its_own_space_comes_back(chart, encoding, rng):
     for ours, theirs in zip(again.spline.knots, knots, strict=True):
         np.testing.assert_array_equal(ours, theirs)
     wi, wo = random_pairs(rng, 20_000, np.radians(80))
-    np.testing.assert_allclose(again.evaluate(wi, wo), model.evaluate(wi, wo), rtol=8e-3)
+    np.testing.assert_allclose(again.evaluate(wi, wo), model.evaluate(wi, wo), rtol=6e-3)
 
 
 def test_a_table_of_a_model_gives_the_model_back(rng):
-    """On the chart's own nodes, where nothing is resampled, up to the tolerance of the iteration."""
+    """On the chart's own nodes, where nothing is resampled, up to the steps that are left out for speed."""
     axes = tuple(np.linspace(0, 1, 31) for _ in range(3))
     knots = [place_knots("averaged", u, n, 3) for u, n in zip(axes, (8, 7, 6), strict=True)]
     control = keep_faces(rng.uniform(0.5, 1.5, (8, 7, 6, 3)), HALF_DIFF)
@@ -210,7 +211,7 @@ def test_a_table_of_a_model_gives_the_model_back(rng):
     table = MeasuredBrdf(Root().decode(spline.evaluate_grid(axes)), np.ones((31, 31, 31), bool), axes, HALF_DIFF)
     again = fit_net(table, HALF_DIFF, Root(), size=(8, 7, 6), knots="averaged")
     points = rng.uniform(0, 0.8, (2000, 3))
-    np.testing.assert_allclose(again.spline.evaluate(points), spline.evaluate(points), rtol=0, atol=8e-3)
+    np.testing.assert_allclose(again.spline.evaluate(points), spline.evaluate(points), rtol=0, atol=7e-3)
 
 
 class Skewed(Brdf):
@@ -274,12 +275,10 @@ def test_extreme_tables_are_fitted_without_overflow():
         peak = model.evaluate([0.3, 0, 1], [-0.3, 0, 1])
         assert np.isfinite(model.spline.control).all()
         assert (peak < 2 * LARGEST_REFLECTANCE).all()
-        # Two layers at the pole and five spans for fourteen: a single bright node is half a peak at best. What is linear
-        # in reflectance would pay for it with all the dark ones.
-        assert (
-            isinstance(encoding, Linear)
-            or (encoding.encode(peak) > 0.05 * encoding.encode(np.array(LARGEST_REFLECTANCE))).all()
-        )
+        # Two layers at the pole and five spans for fourteen: a single bright node is half a peak at best. A linear net
+        # would pay for it with all the dark nodes, which count for more in the metric.
+        if not isinstance(encoding, Linear):
+            assert (encoding.encode(peak) > 0.05 * encoding.encode(np.array(LARGEST_REFLECTANCE))).all()
 
 
 def test_what_is_resampled_is_capped_too():
@@ -309,8 +308,8 @@ def test_the_smallest_and_the_largest_net_that_the_data_carry(size, degrees, rng
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        ({"size": (8, 8)}, "three numbers"),
-        ({"size": (8, 8, 8), "degrees": (3, 3)}, "three numbers"),
+        ({"size": (8, 8)}, "not three whole numbers"),
+        ({"size": (8, 8, 8), "degrees": (3, 3)}, "2 degrees given"),
         ({"size": (3, 8, 8)}, "3 control points"),
         ({"size": (8, 8, 22)}, "22 control points"),
         ({"size": (8, 8, 8), "degrees": (3, 17, 3)}, "Degree 17"),

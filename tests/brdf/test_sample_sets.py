@@ -131,7 +131,7 @@ def test_a_table_with_valid_nodes_beyond_80_degrees_alone_has_an_empty_set():
 
 @functools.cache
 def _spread(which: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return pairs of a set, each moved evenly within its own cell: nodes in rows on the edges of cells tell nothing."""
+    """Return pairs of a set, each moved evenly within its own cell: rows of nodes on edges would tell nothing."""
     rng = np.random.default_rng(which)
     chart, steps = ((IN_OUT, (90, 90, 360)), (RUSINKIEWICZ, (90, 90, 90)))[which]
     p = chart.to_parameters(*_part(draw(GREY, 400_000), which))
@@ -170,11 +170,13 @@ def test_densities_agree_with_a_count_of_the_pairs(chart, cells, nodes, which):
             at = (np.stack([u, v, w], axis=-1).reshape(-1, 3) + corner) / cells
             tame &= (np.minimum(*(d[:, 2] for d in chart.to_directions(at))) > np.cos(np.radians(80))).reshape(cells)
     tame &= counted > 1000
-    assert counted[tame].sum() > 0.25 * counted.sum()
-    quotient = told[tame] / told.sum() / (counted[tame] / counted.sum())
-    print(chart, which, counted[tame].sum() /counted.sum(), quotient.min(), quotient.max(), np.median(quotient))
-    np.testing.assert_allclose(quotient, 1.0, rtol=0, atol=0.12)
-    assert np.median(quotient) == pytest.approx(1.0, abs=0.03)
+    assert counted[tame].sum() > 0.3 * counted.sum()
+    quotient = told / told.sum() / np.maximum(counted / counted.sum(), 1e-9)
+    np.testing.assert_allclose(quotient[tame], 1.0, rtol=0, atol=0.1)
+    assert np.median(quotient[tame]) == pytest.approx(1.0, abs=0.03)
+    if chart is IN_OUT:
+        mirror = quotient[np.arange(1, 8), np.arange(1, 8), cells[2] - 1]
+        np.testing.assert_allclose(mirror, 1.0, rtol=0, atol=0.2)
 
 
 @pytest.mark.parametrize("chart", [IN_OUT, HALF_DIFF], ids=lambda c: c.name)
@@ -200,7 +202,7 @@ def test_the_grid_is_even_on_its_own_chart():
 
 
 class _Nowhere(Brdf):
-    def _evaluate(self, wi, wo):
+    def _evaluate(self, wi, wo):  # noqa: ARG002
         raise AssertionError("drawing looks nothing up")
 
 

@@ -34,5 +34,6 @@ def folder(tmp_path_factory):
     home = tmp_path_factory.mktemp("files")
     table = measure(material_named("satin-paint").brdf, "merl", noise=0.01, seed=3)
     bvbedit.save(table, home / "satin.binary")
-    bvbedit.save(bvbedit.fit(table, size=(12, 8, 5)), home / "satin.bvb")
+    model = bvbedit.fit(table, chart="half-diff", encoding="root", size=(12, 8, 5), precision="float32")
+    bvbedit.save(model, home / "satin.bvb")
     return home

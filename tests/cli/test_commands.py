@@ -37,24 +37,48 @@ def test_fit_writes_a_model_and_tells_what_the_contract_lists(run, folder, tmp_p
     assert set(keys) <= set(told)
     assert told["size"] == [10, 6, 4]
     assert told["file_bytes"] == target.stat().st_size
-    assert told["payload_bytes"] == 10 * 6 * 4 * 3 * 4 + 8 * (6 + 2)
+    assert told["precision"] == "quantised"
+    assert 8 * (6 + 2) < told["payload_bytes"] < 10 * 6 * 4 * 3 * 2 + 8 * (6 + 2)
+    assert told["soundness"]["reciprocity"] == 0 or told["chart"] == "in-out"
     assert told["metrics"]["grid"]["log_cosine_rms"] < 0.1
     assert bvbedit.load(target).spline.size == (10, 6, 4)
 
 
-def test_fit_without_options_is_half_diff_root_averaged_within_48_kib(run, folder, tmp_path):
-    status, out, _ = run("fit", folder / "satin.binary", tmp_path / "m.bvb", "--json")
+def test_fit_without_options_chooses_and_tells_why(run, folder, tmp_path):
+    status, out, _ = run(
+        "fit", folder / "satin.binary", tmp_path / "m.bvb", "--explain", tmp_path / "why.png", "--json"
+    )
     told = one_object(out)
     assert status == 0
-    assert (told["chart"], told["encoding"]["name"], told["knots"]) == ("half-diff", "root", "averaged")
-    assert 0.8 * 48 * 1024 < told["file_bytes"] <= 48 * 1024
+    assert told["knots"] == "dominant"
+    assert {t["chart"] for t in told["tried"]} == {"half-diff", "in-out"}
+    assert (told["chart"], told["encoding"]["name"]) in {(t["chart"], t["encoding"]) for t in told["tried"]}
+    assert told["size"] in [step["size"] for step in told["curve"]]
+    # 1 % of noise: of pairs that a material cannot tell apart, 1 % of log(1 + f cos cos).
+    assert 0 < told["noise"]["grid"] < 0.01
+    from PIL import Image
+
+    with Image.open(tmp_path / "why.png") as picture:
+        assert picture.size == (960, 600)
+
+
+def test_fit_keeps_a_file_bound_and_a_tolerance(run, folder, tmp_path):
+    told = one_object(run("fit", folder / "satin.binary", tmp_path / "m.bvb", "--max-bytes", 6000, "--json")[1])
+    assert told["file_bytes"] <= 6000
+    told = one_object(run("fit", folder / "satin.binary", tmp_path / "m.bvb", "--tolerance", 0.02, "--json")[1])
+    assert max(told["metrics"][s]["log_cosine_rms"] for s in ("grid", "nodes")) <= 0.021
+    status, out, err = run("fit", folder / "satin.binary", tmp_path / "n.bvb", "--tolerance", 1e-6)
+    assert (status, out, err.count("\n")) == (1, "", 1)
+    assert "cannot be reached" in err
+    assert not (tmp_path / "n.bvb").exists()
 
 
 @pytest.mark.parametrize("bound", [2700, 9000])
 def test_fit_keeps_a_payload_bound(run, folder, tmp_path, bound):
     status, out, _ = run("fit", folder / "satin.binary", tmp_path / "m.bvb", "--max-payload", bound, "--json")
     assert status == 0
-    assert 0.7 * bound < one_object(out)["payload_bytes"] <= bound
+    # No more is spent than the material has features for.
+    assert one_object(out)["payload_bytes"] <= bound
 
 
 @pytest.mark.parametrize("precision", ["float16", "float32", "float64"])
@@ -65,6 +89,8 @@ def test_fit_stores_in_the_precision_asked_for(run, folder, tmp_path, precision)
     told = one_object(out)
     assert status == 0
     assert told["precision"] == precision
+    assert told["step"] is None
+    assert told["payload_bytes"] == 6 * 5 * 4 * 3 * np.dtype(precision).itemsize + 8 * (2 + 1)
     assert np.load(target)["control"].dtype == precision
 
 
@@ -210,5 +236,5 @@ def test_demo_does_the_whole_job(run, tmp_path):
     assert err == ""  # no terminal, no progress
     told = one_object(printed)
     assert status == 0
-    assert {"report.md", "comparison.png", "paper.bvb", "half-diff.bvb"} <= set(told["files"])
+    assert {"report.md", "comparison.png", "paper.bvb", "adaptive.bvb"} <= set(told["files"])
     assert "| log-cosine RMS, grid |" in Path(told["report"]).read_text()

@@ -23,7 +23,8 @@ EDITS = {
 @pytest.fixture
 def grey(tmp_path):
     path = tmp_path / "grey.bvb"
-    bvbedit.save(bvbedit.fit(Lambert(0.5), size=(6, 5, 4), encoding="root"), path)
+    model = bvbedit.fit(Lambert(0.5), chart="half-diff", encoding="root", size=(6, 5, 4), precision="float32")
+    bvbedit.save(model, path)
     return path
 
 
