@@ -12,7 +12,7 @@ import numpy as np
 from bvbedit.brdf.base import Brdf
 from bvbedit.brdf.geometry import spherical
 from bvbedit.brdf.losses import Loss
-from bvbedit.brdf.problem import MIRROR
+from bvbedit.brdf.problem import MIRROR, tells_mirrored
 from bvbedit.brdf.sample_sets import HIGHEST_ELEVATION, LARGEST_REFLECTANCE, draw
 
 PAIRS, SEED = 8_000, 4
@@ -43,13 +43,15 @@ def estimate_noise(brdf: Brdf, loss: Loss) -> Noise:
     """
     pairs = draw(brdf, PAIRS, SEED)
     cosines = pairs.wi[:, 2:], pairs.wo[:, 2:]
-    alike = [(pairs.wi, pairs.wo), (pairs.wi * MIRROR, pairs.wo * MIRROR)]
+    alike = [(pairs.wi, pairs.wo)]
+    if tells_mirrored(brdf):
+        alike += [(pairs.wi * MIRROR, pairs.wo * MIRROR)]
     if not brdf.reciprocal:
         alike += [(o, i) for i, o in alike]
     looked = [brdf.evaluate_unit(i, o) for i, o in alike]
     trusted = np.all([t for _, t in looked], axis=0)
     values = np.stack([loss.transform(np.minimum(f, LARGEST_REFLECTANCE), *cosines) for f, _ in looked])
-    variance = values.var(axis=0, ddof=1)
+    variance = values.var(axis=0, ddof=1) if len(alike) > 1 else np.zeros_like(values[0])
     parts = [variance[part][trusted[part]] for part in pairs.parts()]
     grid, nodes = (float(np.sqrt(v.mean())) if v.size else 0.0 for v in parts)
     return Noise(grid, nodes, _at_pole(brdf, loss))

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bvbedit.brdf.base import Brdf
-from bvbedit.brdf.charts import Chart, grid_points
+from bvbedit.brdf.charts import HALF_DIFF, IN_OUT, Chart, grid_points
 from bvbedit.brdf.encodings import Encoding
 from bvbedit.brdf.geometry import Bools, Floats
 from bvbedit.brdf.losses import Loss
@@ -84,15 +84,16 @@ def tabulate(
     """Return ``brdf`` on a grid of ``chart``, by default the one on which it fits.
 
     A measurement on that very chart is taken at its own nodes. Otherwise each node is looked up at all pairs that the
-    chart cannot tell apart: the mirror image, and the exchange of wi and wo where the chart folds it but the BRDF does
-    not; only at the one that ``chart.to_directions`` names unless ``mirrored``.
+    chart cannot tell apart and the BRDF may: the mirror image, and the exchange of wi and wo where the chart folds it;
+    only at the one that ``chart.to_directions`` names unless ``mirrored``.
     Raises BvbError where not one node has data behind it.
     """
     if isinstance(brdf, MeasuredBrdf) and brdf.chart is chart:
         return _own(brdf, chart)
     axes = chart.fitting_grid if axes is None else axes
     shape = tuple(len(u) for u in axes)
-    count = (2 if mirrored else 1) * (2 if mirrored and chart.reciprocal and not brdf.reciprocal else 1)
+    reflected = 2 if mirrored and tells_mirrored(brdf) else 1
+    count = reflected * (2 if mirrored and chart.reciprocal and not brdf.reciprocal else 1)
     sides = tuple(np.empty((*shape, 3)) for _ in range(count))
     trusted = tuple(np.empty(shape, dtype=bool) for _ in range(count))
     cosines = np.empty((*shape, 1)), np.empty((*shape, 1))
@@ -106,17 +107,22 @@ def tabulate(
         wi, wo = off_horizon(wi), off_horizon(wo)
         for cosine, w in zip(cosines, (wi, wo), strict=True):
             cosine[part] = _cosine(w).reshape(*layers, 1)
-        pairs = [(wi, wo), (wi * MIRROR, wo * MIRROR)][: min(count, 2)]
+        pairs = [(wi, wo), (wi * MIRROR, wo * MIRROR)][:reflected]
         pairs += [(o, i) for i, o in pairs][: count - len(pairs)]
         for k, (i, o) in enumerate(pairs):
             f, backed = brdf.evaluate_unit(i, o)
             sides[k][part] = np.minimum(f, LARGEST_REFLECTANCE, out=f).reshape(*layers, 3)
             trusted[k][part] = (backed & unmoved).reshape(layers)
     shares = np.full((2, count), 1 / count)
-    if mirrored and not chart.reciprocal:
+    if reflected > 1 and not chart.reciprocal:
         shares[:] = [_sidedness(brdf, s) for s in (0, 1)]
     clamped = brdf.clamped if isinstance(brdf, MeasuredBrdf) else 0.0
     return _checked(Table(chart, axes, sides, trusted, densities(chart, axes, INSIDE), shares, cosines, clamped))
+
+
+def tells_mirrored(brdf: Brdf) -> bool:
+    """Return whether ``brdf`` may tell a pair from its mirror image: on a folded chart both are one reading."""
+    return getattr(brdf, "chart", None) not in (IN_OUT, HALF_DIFF)
 
 
 def _own(brdf: MeasuredBrdf, chart: Chart) -> Table:

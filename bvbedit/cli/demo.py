@@ -19,7 +19,7 @@ FITS: dict[str, tuple[str, dict[str, Any]]] = {
             "precision": "float32",
         },
     ),
-    "adaptive": ("automatic, 16 KiB", {"max_bytes": 16 * 1024}),
+    "adaptive": ("automatic, up to 16 KiB", {"max_bytes": 16 * 1024}),
 }
 PICTURE: dict[str, Any] = {"width": 320, "height": 320, "spp": 64}
 # Differences are made visible by a power of two, so that one pixel in a hundred is as bright as can be.

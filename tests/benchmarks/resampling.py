@@ -2,7 +2,7 @@
 
 Each measurement (by default the generated ones) is taken to the grid of ``half-diff``, as every fit does, interpolated
 from there, and compared with itself. The floor is what folding alone costs: the chart averages mirror images. A
-grid of 1 stands for the chart's own 91 x 91 x 91 nodes.
+grid of 1 stands for the 91 x 91 x 61 nodes on which the chart fits.
 """
 
 import sys
@@ -16,11 +16,12 @@ import bvbedit
 from bvbedit.brdf.base import Brdf
 from bvbedit.brdf.charts import HalfDiff
 from bvbedit.brdf.encodings import Log
-from bvbedit.brdf.fit import sample
 from bvbedit.brdf.geometry import Bools, Floats
 from bvbedit.brdf.goniophotometer import measure
+from bvbedit.brdf.losses import loss_named
 from bvbedit.brdf.materials import MATERIALS
 from bvbedit.brdf.measured import MeasuredBrdf
+from bvbedit.brdf.problem import pose, tabulate
 
 DENSITIES = (0.5, 1.0, 2.0)
 STRIDE = 3
@@ -42,10 +43,11 @@ class Folded(Brdf):
 def resampled(brdf: Brdf, density: float) -> MeasuredBrdf:
     """Return ``brdf`` as a table on the half-diff grid, with ``density`` nodes for each of the chart's own."""
     chart = HalfDiff()
-    chart.grid = tuple(np.linspace(0, 1, round(density * (len(u) - 1)) + 1) for u in chart.grid)  # type: ignore[assignment]
+    u, v, w = (np.linspace(0, 1, round(density * (len(u) - 1)) + 1) for u in chart.fitting_grid)
+    table = tabulate(brdf, chart, (u, v, w))
     encoding = Log(1e-3)
-    samples = sample(brdf, chart, encoding)
-    return MeasuredBrdf(encoding.decode(samples.values), samples.weights > 0, samples.axes, chart)
+    posed = pose(table, encoding, loss_named("log_cosine_rms"), (1.0, 1.0))
+    return MeasuredBrdf(encoding.decode(posed.values), np.any(table.trusted, axis=0), table.axes, chart)
 
 
 def main() -> None:

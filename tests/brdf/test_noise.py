@@ -6,7 +6,7 @@ import pytest
 from bvbedit.brdf.base import Brdf
 from bvbedit.brdf.charts import HALF_DIFF, IN_OUT, RUSINKIEWICZ, RUSINKIEWICZ_360, Chart, grid_points
 from bvbedit.brdf.encodings import Root
-from bvbedit.brdf.geometry import spherical
+from bvbedit.brdf.geometry import elevation, spherical
 from bvbedit.brdf.goniophotometer import FLOOR
 from bvbedit.brdf.losses import LOSSES, Loss
 from bvbedit.brdf.materials import MATERIALS, material_named
@@ -25,7 +25,7 @@ each_loss = pytest.mark.parametrize("loss", LOSSES.values(), ids=list(LOSSES))
 def _really(table: Brdf, truth: Brdf, loss: Loss) -> tuple[float, float, float]:
     """Return the standard deviations of T that the table has over other pairs of both sets, and at theta_h = 0."""
     pairs = draw(table, 20_000, seed=77)
-    theta, phi = np.radians(np.linspace(1, 79, 79))[:, None], np.radians(np.arange(0.0, 180.0, 2.0))
+    theta, phi = np.radians(np.arange(2.0, 81.0, 2.0))[:, None], np.radians(np.arange(0.0, 180.0))
     pole = spherical(theta, phi).reshape(-1, 3)
     opposite = pole * np.array([-1.0, -1.0, 1.0])
     parts = [(pairs.wi[part], pairs.wo[part]) for part in pairs.parts()] + [(pole, opposite)]
@@ -61,8 +61,8 @@ def test_at_merls_nodes_the_noise_is_the_one_that_the_instrument_was_given():
 def _simulated(chart: Chart, shape: tuple[int, int, int], relative: float) -> tuple[MeasuredBrdf, MeasuredBrdf]:
     """Return a table of a smooth material with independent noise in each cell, and the one without."""
     axes = tuple(np.arange(n) / (n - (not p)) for n, p in zip(shape, chart.periodic, strict=True))
-    wi, wo = (np.maximum(w, [-1, -1, 0]) for w in chart.to_directions(grid_points(axes)))
-    f = Glossy(0.8).evaluate(wi + [0, 0, 1e-9], wo + [0, 0, 1e-9])
+    wi, wo = (np.maximum(w, [-1, -1, 1e-9]) for w in chart.to_directions(grid_points(axes)))
+    f = Glossy(0.8).evaluate(wi, wo)
     readings = f * (1 + relative * np.random.default_rng(3).normal(size=f.shape))
     exact, noisy = (MeasuredBrdf(v.reshape(*shape, 3), np.ones(shape, bool), axes, chart) for v in (f, readings))
     return noisy, exact
@@ -80,18 +80,26 @@ def test_noise_is_told_on_every_chart_that_measures_a_pair_more_than_once(kind):
     noisy, exact = _simulated(*SIMULATED[kind], 0.1)
     noise = estimate_noise(noisy, LOG_COSINE)
     grid, nodes, _ = _really(noisy, exact, LOG_COSINE)
-    np.testing.assert_allclose([noise.grid, noise.nodes], [grid, nodes], rtol=0.1)
+    assert noise.grid == pytest.approx(grid, rel=0.1)
+    if noisy.chart is IN_OUT:
+        # Near the mirror direction, where MERL's nodes crowd, exchanged pairs are read from the same cells.
+        assert 0.7 * nodes < noise.nodes < nodes
+    else:
+        assert noise.nodes == pytest.approx(nodes, rel=0.1)
 
 
 @pytest.mark.parametrize("kind", SIMULATED)
 def test_the_variance_of_what_half_diff_is_fitted_to_is_that_of_its_errors(kind):
-    """The mean over sides that were measured independently; what a chart holds once counts once."""
+    """The mean over sides that were measured independently; what a table holds once counts once."""
     noisy, exact = (
         pose(tabulate(t, HALF_DIFF), Root(), LOG_COSINE, (1.0, 1.0)) for t in _simulated(*SIMULATED[kind], 0.05)
     )
     sure = np.zeros(noisy.weights.shape, bool)
     sure[5:-5, 5:-5, 3:-3] = True
     sure &= np.all(noisy.table.trusted, axis=0)
+    if kind == "the paper's":  # exchanged pairs within two cells of 2 degrees are one reading, or half of one
+        lower, higher = (elevation(w) for w in HALF_DIFF.to_directions(grid_points(HALF_DIFF.fitting_grid)))
+        sure &= (np.abs(lower - higher) > np.radians(4)).reshape(sure.shape)
     off = np.sum((noisy.values - exact.values) ** 2, axis=-1)
     assert noisy.variance[sure].mean() == pytest.approx(off[sure].mean(), rel=0.1)
 
