@@ -1,12 +1,21 @@
-"""The Python surface: what it refuses."""
+"""The Python surface: what it refuses, what quantising costs, the paper's configuration untouched."""
 
+import numpy as np
 import pytest
 
 import bvbedit
 from bvbedit import BvbError
 from bvbedit.brdf.analytic import Lambert
+from bvbedit.brdf.charts import IN_OUT
+from bvbedit.brdf.encodings import Linear
+from bvbedit.brdf.fit import fit_net
+from bvbedit.brdf.metrics import estimate
+from bvbedit.brdf.storage import Storage
+from bvbedit.io.budget import payload_bytes
+from tests.brdf.samples import Glossy
 
 GREY = Lambert(0.5)
+GLOSSY = Glossy(0.4)
 
 
 @pytest.mark.parametrize(
@@ -45,3 +54,21 @@ GREY = Lambert(0.5)
 def test_impossible_fits_are_refused(options, says):
     with pytest.raises(BvbError, match=says):
         bvbedit.fit(GREY, **options)
+
+
+@pytest.mark.parametrize("metric", ["log_cosine_rms", "fores", "relative_l1"])
+def test_quantising_adds_a_small_share_to_the_error_of_every_metric(metric):
+    model = bvbedit.fit(GLOSSY, chart="half-diff", size=(10, 6, 5), metric=metric)
+    assert model.storage.precision == "quantised"
+    exact, stored = estimate(model, GLOSSY).to_dict(), model.report["metrics"]
+    assert all(stored[part][metric] < 1.15 * exact[part][metric] for part in ("grid", "nodes"))
+    assert payload_bytes(model) < 0.5 * payload_bytes(model.stored_as(Storage("float16")))
+
+
+def test_the_published_configuration_is_that_of_the_net_but_for_its_storage():
+    options = {"size": (5, 5, 8), "knots": "piegl-tiller"}
+    model = bvbedit.fit(GLOSSY, chart="in-out", encoding="linear", precision="float32", **options)
+    expected = fit_net(GLOSSY, IN_OUT, Linear(), **options)
+    np.testing.assert_array_equal(model.spline.control, expected.spline.control)
+    assert (model.report["solver"], model.report["knots"]) == ("lofting", "piegl-tiller")
+    assert model.storage == Storage("float32")

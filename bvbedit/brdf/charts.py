@@ -79,7 +79,7 @@ class InOut(Chart):
     degenerate_faces = (DegenerateFace(axis=0, along=2, layers=1), DegenerateFace(axis=1, along=2, layers=1))
     reciprocal = False
     grid = (np.arange(91) / 90, np.arange(91) / 90, np.arange(361) / 360)
-    fitting_grid = (np.arange(91) / 90, np.arange(91) / 90, np.arange(181) / 180)
+    fitting_grid = (np.arange(91) / 90, np.arange(91) / 90, np.arange(151) / 150)
     trial_grid = (np.arange(46) / 45, np.arange(46) / 45, np.arange(61) / 60)
     hold_order = (0, 1, 2)
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from bvbedit.brdf.base import Brdf, check_brdf
+from bvbedit.brdf.base import BLOCK, Brdf, check_brdf
 from bvbedit.brdf.geometry import Floats, spherical
 from bvbedit.brdf.sample_sets import HIGHEST_ELEVATION, HORIZON_MARGIN, LARGEST_REFLECTANCE, MARGIN, draw, node_blocks
 from bvbedit.errors import BvbError
@@ -122,14 +122,22 @@ def _paper(
     wo = spherical(theta[:, None], phi).reshape(-1, 3)
     low_o = np.repeat(theta <= HIGHEST_ELEVATION + MARGIN, len(phi))
     distances = np.empty((len(theta), 2))
-    for i, wi in enumerate(spherical(theta, np.zeros(1))):
-        wi_all = np.broadcast_to(wi, wo.shape)
-        fa, fb = a.evaluate_unit(wi_all, wo)[0], b.evaluate_unit(wi_all, wo)[0]
-        length = np.linalg.norm(np.minimum(fa, LARGEST_REFLECTANCE) - np.minimum(fb, LARGEST_REFLECTANCE), axis=1)
-        distances[i] = length.max(), length.mean()
-        if grid is not None and theta[i] <= HIGHEST_ELEVATION + MARGIN:
-            grid.add(fa[low_o], fb[low_o], np.full(np.count_nonzero(low_o), wi[2]), wo[low_o, 2])
-        done(i + 1)
+    # Several elevations at once: a call for each would cost more than its pairs.
+    together = max(1, BLOCK // len(wo))
+    for start in range(0, len(theta), together):
+        lights = spherical(theta[start : start + together], np.zeros(1))
+        wi_all, wo_all = np.repeat(lights, len(wo), axis=0), np.tile(wo, (len(lights), 1))
+        fa, fb = a.evaluate_unit(wi_all, wo_all)[0], b.evaluate_unit(wi_all, wo_all)[0]
+        difference = np.minimum(fa, LARGEST_REFLECTANCE) - np.minimum(fb, LARGEST_REFLECTANCE)
+        length = np.linalg.norm(difference, axis=1).reshape(len(lights), -1)
+        distances[start : start + together, 0] = length.max(axis=1)
+        distances[start : start + together, 1] = length.mean(axis=1)
+        if grid is not None:
+            counted = np.repeat(theta[start : start + together] <= HIGHEST_ELEVATION + MARGIN, len(wo))
+            counted &= np.tile(low_o, len(lights))
+            if counted.any():
+                grid.add(fa[counted], fb[counted], wi_all[counted, 2], wo_all[counted, 2])
+        done(start + len(lights))
     return PaperErrors(
         float(distances[:, 0].max()), float(distances[:, 1].mean()), *(float(e) for e in distances[45 // stride])
     )

@@ -109,7 +109,8 @@ class Plan:
             return Storage(precision)
         problem = self.problem
         overlap = float(np.prod([_overlap(x, path) for x, path in zip(self.lines, self.paths, strict=True)]))
-        allowed = QUANTISATION * float(np.dot(problem.balance, errors**2))
+        # Means of |error|^power to the power 2/power: squares of a typical error, as the weights count them.
+        allowed = QUANTISATION * float(np.dot(problem.balance, errors ** (4 / problem.loss.power)))
         largest = float(np.abs(problem.values).max())
         step = np.sqrt(12 * allowed / max(problem.weights.mean() * overlap, np.finfo(float).tiny))
         return Storage(precision, float(np.clip(step, max(largest, 1e-3) * 2.0**-20, max(largest, 1e-3) * 2.0**-4)))

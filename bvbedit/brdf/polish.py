@@ -23,6 +23,8 @@ STEPS = 6
 DAMPING = 0.1
 # Lengths of a step that are tried.
 LENGTHS = (1.0, 0.5, 0.25, 0.1)
+# Smaller squares of an error count as so large, that of a black material's exact fit too.
+SMALLEST_ERROR = 1e-150
 
 
 def polish(
@@ -74,7 +76,7 @@ def polish(
             if size == 0:
                 continue
             # Least squares of the logarithm of an error: it counts by its inverse square.
-            counts[part] = 1.0 / (size * max(loss.norm(error[part]) ** 2, np.finfo(float).tiny))
+            counts[part] = 1.0 / (size * max(samples.norm(error, part, loss) ** 2, SMALLEST_ERROR))
         weighted = samples.weights * counts * loss.reweighting(error) * slope
         curvature = weighted * slope
         # As much damping in all as there is curvature in all.

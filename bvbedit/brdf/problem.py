@@ -218,9 +218,11 @@ def pose(
         values = hold(values, known, table.chart.hold_order)
     density = np.where(known, density, HELD * mean)
     if weights is not None:
+        total = density.sum()
         density = density * checked_weights(weights, grid_points(table.axes)).reshape(shape)
         if not density.any():
             raise BvbError("weights are zero at all nodes. Return numbers above zero where the model is to be good.")
+        density = density * (total / density.sum())
     f = encoding.decode(values)
     slope = loss.slope(f, *table.cosines) * encoding.slope(values)
     if loss.power != 2:
@@ -232,7 +234,7 @@ def pose(
 
 
 def checked_weights(weights: Weights, points: Floats) -> Floats:
-    """Return ``weights(points)`` (n,). Raises BvbError where that is no row of finite numbers >= 0."""
+    """Return ``weights(points)`` (n,), the largest as 1. Raises BvbError where they are no finite numbers >= 0."""
     if not callable(weights):
         raise BvbError(f"weights is {shown(weights)}. Give a function of chart parameters (n, 3).")
     found = real_array(weights(points), "Weights")
@@ -241,4 +243,4 @@ def checked_weights(weights: Weights, points: Floats) -> Floats:
             f"weights returned {shown(found)} for {len(points):,} points. "
             "Return finite numbers >= 0, one for each point (n, 3)."
         )
-    return found
+    return found / (found.max(initial=0.0) or 1.0)

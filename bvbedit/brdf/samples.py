@@ -34,14 +34,20 @@ class Samples:
     parts: tuple[slice, slice]
     """The places of each set."""
     weights: Floats
-    """(N, 1)."""
+    """(N, 1): what an error counts, 1 at most."""
 
     def errors(self, f: Floats, loss: Loss) -> Floats:
         """Return the metric over each of the sets (2,), but for its scale, of a model's reflectance ``f`` (N, 3)."""
         e = loss.transform(f, *self.cosines) - loss.transform(self.reflectance, *self.cosines)
         # A set without a sample, as tables with large holes have it, says nothing: the other one speaks for it.
-        found = [loss.norm(e[part]) for part in self.parts if part.stop > part.start]
+        found = [self.norm(e, part, loss) for part in self.parts if self.weights[part].any()]
         return np.array([found[0], found[-1]]) if found else np.zeros(2)
+
+    def norm(self, error: Floats, part: slice, loss: Loss) -> float:
+        """Return ``loss.norm`` of the errors of T (N, 3) in a part, each counted by its weight."""
+        weights = self.weights[part]
+        mean = float(weights.mean()) if weights.any() else 1.0
+        return loss.norm(error[part] * weights ** (1 / loss.power)) / float(np.sqrt(mean))
 
     def metrics(self, errors: Floats, loss: Loss) -> tuple[float, float]:
         """Return the metric itself over each of the sets, for the ``errors`` (2,) of a model."""

@@ -323,8 +323,22 @@ def test_weights_given_multiply_those_built_in(chart, loss):
 
     plain, weighted = (pose(table, Root(), loss, (1.0, 1.0), w) for w in (None, given))
     factors = given(grid_points(SMALL)).reshape(plain.weights.shape)
-    np.testing.assert_allclose(weighted.weights, factors * plain.weights, rtol=1e-14)
+    quotient = weighted.weights / (factors * plain.weights)
+    np.testing.assert_allclose(quotient, quotient[0, 0, 0], rtol=1e-12)
     np.testing.assert_array_equal(weighted.values, plain.values)
+
+
+@pytest.mark.parametrize("scale", [1e-300, 1e-3, 1e3, 1e300])
+def test_weights_given_in_another_scale_are_the_same(scale):
+    """The step in which a net is stored follows from the weights: their unit must not matter."""
+    one, other = (
+        pose(_table(HALF_DIFF), Root(), LOG_COSINE, (0.3, 1.0), lambda p, s=s: s * (0.1 + p[:, 0]))
+        for s in (1.0, scale)
+    )
+    np.testing.assert_allclose(other.weights, one.weights, rtol=1e-12)
+    flat = pose(_table(HALF_DIFF), Root(), LOG_COSINE, (0.3, 1.0), lambda p: np.full(len(p), scale))
+    plain = pose(_table(HALF_DIFF), Root(), LOG_COSINE, (0.3, 1.0))
+    np.testing.assert_allclose(flat.weights, plain.weights, rtol=1e-12)
 
 
 def test_weights_may_be_zero_in_parts():

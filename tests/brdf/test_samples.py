@@ -179,8 +179,34 @@ def test_weights_are_those_of_the_function():
         return p @ np.array([1.0, 2.0, 3.0])
 
     samples = draw_samples(Glossy(), HALF_DIFF, 300, weights=weights)
-    np.testing.assert_array_equal(samples.weights[:, 0], weights(samples.parameters))
+    given = weights(samples.parameters)
+    np.testing.assert_allclose(samples.weights[:, 0], given / given.max(), rtol=1e-15)
     assert (draw_samples(Glossy(), HALF_DIFF, 300).weights == 1).all()
+
+
+@each_loss
+def test_errors_count_by_their_weights(loss):
+    """Weights that are whole numbers, the largest 3, are so many samples in one place."""
+    samples = draw_samples(Glossy(0.3), HALF_DIFF, 200, weights=lambda p: np.floor(4 * p[:, 1]))
+    times = np.rint(3 * samples.weights[:, 0]).astype(int)
+    assert set(times) == {0, 1, 2, 3}
+    f = samples.reflectance * np.random.default_rng(0).uniform(0.5, 1.5, samples.reflectance.shape)
+    repeated = [np.repeat(a, times, axis=0) for a in (f, samples.reflectance, *samples.cosines)]
+    off = loss.transform(repeated[0], *repeated[2:]) - loss.transform(repeated[1], *repeated[2:])
+    first = int(times[samples.parts[0]].sum())
+    expected = [loss.norm(off[:first]), loss.norm(off[first:])]
+    np.testing.assert_allclose(samples.errors(f, loss), expected, rtol=1e-12)
+
+
+@each_loss
+def test_a_set_without_weight_is_spoken_for_by_the_other(loss):
+    samples = draw_samples(Glossy(0.3), HALF_DIFF, 200)
+    weights = np.ones_like(samples.weights)
+    weights[samples.parts[0]] = 0
+    heard = Samples(samples.parameters, samples.reflectance, samples.cosines, samples.parts, weights)
+    f = 0.5 * samples.reflectance
+    nodes = samples.errors(f, loss)[1]
+    np.testing.assert_array_equal(heard.errors(f, loss), [nodes, nodes])
 
 
 @pytest.mark.parametrize(

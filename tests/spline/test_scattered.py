@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bvbedit.spline.scattered import ScatteredBasis, conjugate_gradients
@@ -13,6 +13,7 @@ EPS = float(np.finfo(np.float64).eps)
 
 degrees = st.tuples(*[st.integers(0, 5)] * 3)
 seeds = st.integers(0, 2**32 - 1)
+few = settings(max_examples=40)
 
 
 def _case(p: tuple[int, int, int], seed: int, count: int = 60) -> tuple[list[np.ndarray], np.ndarray]:
@@ -28,6 +29,7 @@ def _net(knots: list[np.ndarray], p: tuple[int, int, int], channels: int, seed: 
     return np.random.default_rng(seed).normal(size=(*shape, channels))
 
 
+@few
 @given(p=degrees, channels=st.integers(1, 5), seed=seeds)
 def test_applied_to_a_net_it_is_the_spline(p, channels, seed):
     knots, points = _case(p, seed)
@@ -45,6 +47,7 @@ def test_applied_to_a_net_it_is_the_definition():
     np.testing.assert_allclose(ScatteredBasis(points, knots, p).apply(control), expected, rtol=0, atol=1e-14)
 
 
+@few
 @given(p=degrees, channels=st.integers(1, 5), seed=seeds)
 def test_transposed_it_is_the_adjoint(p, channels, seed):
     """<B x, y> = <x, B^T y> for any x and y."""
@@ -57,6 +60,7 @@ def test_transposed_it_is_the_adjoint(p, channels, seed):
     assert abs(np.vdot(image, y) - np.vdot(x, basis.apply_transposed(y))) <= 1e-13 * scale
 
 
+@few
 @given(p=degrees, seed=seeds)
 def test_the_overlap_is_the_mean_sum_of_squares(p, seed):
     knots, points = _case(p, seed, count=20)
@@ -65,6 +69,7 @@ def test_the_overlap_is_the_mean_sum_of_squares(p, seed):
     assert ScatteredBasis(points, knots, p).overlap == pytest.approx(brute, rel=1e-12)
 
 
+@few
 @given(p=degrees, seed=seeds)
 def test_it_is_a_partition_of_unity(p, seed):
     knots, points = _case(p, seed)
