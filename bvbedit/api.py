@@ -91,7 +91,8 @@ def fit(
 
     ``metric`` names what is to be small: ``log_cosine_rms``, ``fores`` or ``relative_l1``. ``weights``, a function of
     chart parameters (n, 3) that returns (n,) >= 0, multiplies the weights that follow from it. ``precision``:
-    ``quantised`` (``auto``; the step is meant to add 4 % to the error, 1 to 15 % were seen), ``float16``, ``float32`` or ``float64``.
+    ``quantised`` (``auto``, but ``float32`` in the paper's configuration; the step is meant to add 4 % to the error, 1
+    to 15 % were seen), ``float16``, ``float32`` or ``float64``.
     ``smoothing`` penalises differences of the net, for noisy data: a strength, or ``auto`` for the one that generalised
     cross-validation finds. ``thorough`` takes more steps on the metric itself and seconds longer. ``source`` names the
     data in the report, whose bytes count too.
