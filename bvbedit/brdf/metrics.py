@@ -56,6 +56,11 @@ class Comparison:
         return asdict(self)
 
 
+def _lengths(v: Floats) -> Floats:
+    """Return the lengths (n,) of ``v`` (n, 3), whose squares may leave the range of float64."""
+    return np.asarray(np.hypot(np.hypot(v[:, 0], v[:, 1]), v[:, 2]))
+
+
 class _Sums:
     """Running sums of one sample set, so that millions of samples need no more memory than a block."""
 
@@ -66,9 +71,9 @@ class _Sums:
     def add(self, a: Floats, b: Floats, cos_i: Floats, cos_o: Floats) -> None:
         c = (cos_i * cos_o)[:, None]
         self.squared += float(np.sum((np.log1p(a * c) - np.log1p(b * c)) ** 2))
-        self.roots += float(np.sum(np.cbrt(((a - b) * cos_i[:, None]) ** 2)))
-        self.difference += float(np.sum(np.linalg.norm(a - b, axis=1)))
-        self.length += float(np.sum(np.linalg.norm(b, axis=1)))
+        self.roots += float(np.sum(np.cbrt((a - b) * cos_i[:, None]) ** 2))
+        self.difference += float(np.sum(_lengths(a - b)))
+        self.length += float(np.sum(_lengths(b)))
         self.samples += len(a)
 
     def errors(self) -> Errors:

@@ -225,15 +225,9 @@ def pose(
         density = density * (total / density.sum())
     f = encoding.decode(values)
     slope = loss.slope(f, *table.cosines) * encoding.slope(values)
-    looked_at = np.broadcast_to(sum(wanted), shape)
     if loss.power != 2:
-        error = loss.expected(f, *table.cosines)
-        mean_error = np.vdot(looked_at, error.mean(axis=-1)) / max(looked_at.sum(), np.finfo(float).tiny)
-        slope = slope * np.sqrt(loss.reweighting(error, float(mean_error)))
+        slope = slope * np.sqrt(loss.reweighting(loss.expected(f, *table.cosines)))
     squared = np.einsum("...c,...c->...", slope, slope) / 3
-    # Towards the horizon values grow without bound: where no set looks no node counts more than the mean one.
-    typical = np.vdot(looked_at, squared) / max(looked_at.sum(), np.finfo(float).tiny)
-    squared = np.where(looked_at > 0, squared, np.minimum(squared, typical))
     # Where all channels are black their slope may be zero: the model is to be black there too.
     squared = np.maximum(squared, 1e-9 * squared.max()) if squared.any() else np.ones_like(squared)
     return Problem(table, encoding, loss, (float(balance[0]), float(balance[1])), values, density * squared, variance)
