@@ -29,7 +29,7 @@ from bvbedit.spline.arguments import is_real_within, is_whole, shown
 
 __all__ = ["Comparison", "blend", "compare", "fit", "load", "render", "save"]
 
-# What ``encoding="auto"`` tries; ``linear`` is never the best of the three.
+# What ``encoding="auto"`` tries: those that highlights ask for.
 ENCODINGS = ("root", "log")
 # The knee of the error curve is looked for up to so many control points, a file of about 100 KB.
 LARGEST_KNEE = 64_000
