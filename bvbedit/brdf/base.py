@@ -23,6 +23,8 @@ class Brdf(ABC):
     reliable_elevation: float = float(np.radians(89.0))
     # Whether f(wi, wo) = f(wo, wi) by construction, so that a folded chart need not average the two.
     reciprocal: bool = False
+    # How many places were measured: between them values are interpolated, noise and all. None where there is no noise.
+    readings: int | None = None
 
     @abstractmethod
     def _evaluate(self, wi: Floats, wo: Floats) -> tuple[Floats, Bools]:

@@ -62,6 +62,7 @@ class MeasuredBrdf(Brdf):
             np.maximum(table, 0.0, out=table)
         for a in (table, mask, *nodes):
             a.setflags(write=False)
+        self.readings = count
         self.values: Floats = table
         self.valid: Bools = mask
         self.axes: tuple[Floats, Floats, Floats] = (nodes[0], nodes[1], nodes[2])

@@ -40,6 +40,7 @@ class RglBrdf(Brdf):
         a = {name: np.array(value, dtype=np.float64, order="C") for name, value in fields.items()}
         _check(a)
         self.theta_i, self.sigma, self.ndf, self.rgb = a["theta_i"], a["sigma"], a["ndf"], a["rgb"]
+        self.readings = self.rgb.size // 3
         self.jacobian = bool(jacobian)
         self.description = description
         self.vndf, self._conditional, self._marginal = _distributions(a["vndf"])

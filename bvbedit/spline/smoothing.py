@@ -65,21 +65,24 @@ def choose_strength(
     parameters: Sequence[Floats],
     knots: Sequence[Floats],
     degrees: Sequence[int],
+    independent: float | None = None,
 ) -> Smoothing:
     """Return the strength of smoothing that generalised cross-validation finds best for data on a grid.
 
-    Arguments as of ``smooth``. The score is N |sqrt(W) (V - y)|^2 / (N - trace H)^2, N the number of data with weight
-    and H the hat matrix, common to all channels. W is replaced by the product of its marginals: then each axis has a
-    basis in which its normal matrix is one and its penalty diagonal, and for every strength the trace and the residual
-    are sums over the modes. Data of weight zero are replaced by a smooth continuation of the others. The least score is
-    searched on a logarithmic grid, from no smoothing to multilinear functions, and then by a golden section.
+    Arguments as of ``smooth``. The score is N |sqrt(W) (V - y)|^2 / (N - N/M trace H)^2, N the number of data with
+    weight, M how many of them are ``independent``, by default all, and H the hat matrix, common to all channels. W is
+    replaced by the product of its marginals: then each axis has a basis in which its normal matrix is one and its
+    penalty diagonal, and for every strength the trace and the residual are sums over the modes. Data of weight zero are
+    replaced by a smooth continuation of the others. The least score is searched on a logarithmic grid, from no
+    smoothing to multilinear functions, and then by a golden section.
 
-    The noise of neighbouring data is taken to be independent: errors that hang together are seen as features.
-    Raises BvbError as ``smooth`` does. Source: Craven & Wahba (1979).
+    Errors that hang together are seen as features unless M says so: where k neighbours in each place share a reading,
+    as after an interpolation, only N/k tell something new (the effective number of data; Altman, 1990, "Kernel
+    smoothing of data with correlated errors"). Raises BvbError as ``smooth`` does. Source: Craven & Wahba (1979).
     """
     values, parameters, knots, degrees = _checked_data(values, parameters, knots, degrees)
-    problem = _Problem(values, _checked_weights(weights, values.shape[:-1]), parameters, knots, degrees)
-    return problem.best()
+    weights = _checked_weights(weights, values.shape[:-1])
+    return _Problem(values, weights, parameters, knots, degrees, _checked_count(independent)).best()
 
 
 def smooth(
@@ -92,6 +95,7 @@ def smooth(
     start: Floats | None = None,
     project: Callable[[Floats], Floats] = lambda control: control,
     strength: float | None = None,
+    independent: float | None = None,
     tolerance: float = 1e-3,
     max_iterations: int = 200,
     progress: Callable[[float], None] | None = None,
@@ -101,8 +105,9 @@ def smooth(
     ``values`` (m_1, ..., m_d, c), ``weights`` (m_1, ..., m_d) >= 0, the d axes ``parameters`` (m_a,) and ``knots`` as
     for ``fit_weighted``, and ``start``, ``project``, ``tolerance`` and ``max_iterations`` too; without a start it is
     the solution for the product of the weights' marginals. ``strength`` is in 0 ... 1e15, or chosen by
-    ``choose_strength``. Where weights are far below that product the penalty alone continues the spline, which takes
-    long to settle: the default tolerance is reached in 1 to 40 iterations, when the fit of the other data is final.
+    ``choose_strength``, to which ``independent`` data are told. Where weights are far below that product the penalty
+    alone continues the spline, which takes long to settle: the default tolerance is reached in 1 to 40 iterations, when
+    the fit of the other data is final.
 
     D_a are the ``second_differences`` of the net along axis a; |.|^2 sums over the lines along that axis through the
     nodes of the others, weighed by their marginals (Wood, 2006, "Low-rank scale-invariant tensor product smooths"; the
@@ -120,7 +125,7 @@ def smooth(
         raise BvbError(
             f"Strength {shown(strength)} cannot smooth. Choose one in 0 ... {LARGEST_STRENGTH:g}, or none to find it."
         )
-    problem = _Problem(values, weights, parameters, knots, degrees)
+    problem = _Problem(values, weights, parameters, knots, degrees, _checked_count(independent))
     smoothing = problem.best() if strength is None else problem.told([float(strength)], float(strength))
     result = fit_weighted(
         values,
@@ -136,6 +141,12 @@ def smooth(
         progress=progress,
     )
     return result, smoothing
+
+
+def _checked_count(independent: float | None) -> float:
+    if independent is not None and not is_real_within(independent, 1.0, 1e300):
+        raise BvbError(f"{shown(independent)} data cannot be independent. Give a number from 1 up, or none for all.")
+    return np.inf if independent is None else float(independent)
 
 
 def second_differences(knots: Floats, degree: int) -> Floats:
@@ -192,6 +203,7 @@ class _Problem:
         parameters: Sequence[Floats],
         knots: Sequence[Floats],
         degrees: Sequence[int],
+        independent: float,
     ) -> None:
         known = weights > 0
         largest = weights.max()
@@ -206,6 +218,7 @@ class _Problem:
         # (m_a, n_a): sqrt(W_a) A_a T_a, of orthonormal columns.
         images = [r[:, None] * a.matrix.apply(b, 0) for a, b, r in zip(axes, self._bases, roots, strict=True)]
         self._count, self._channels = int(known.sum()), values.shape[-1]
+        self._alike = max(1.0, self._count / independent)
         # The product of the marginals stands for the weights of those data that have any.
         replaced = float(along_all([w[None] for w in marginals], known[..., None].astype(np.float64)).sum())
         self._unit = float(np.sqrt(largest) * np.sqrt((weights / largest).sum() / replaced))
@@ -232,24 +245,26 @@ class _Problem:
         return np.ldexp(self._solved(strength), self._exponent)
 
     def _residual(self, strength: float) -> tuple[float, float]:
-        """Return |sqrt(W) (V - y)|^2 of a mean channel, and N - trace H."""
+        """Return |sqrt(W) (V - y)|^2 of a mean channel, and trace H."""
         lost = strength * self._damping
         lost /= 1.0 + lost
         total = self._outside + float(np.vdot(lost * lost, self._energy))
-        return total / self._channels, self._count - lost.size + float(lost.sum())
+        return total / self._channels, lost.size - float(lost.sum())
 
     def _score(self, strength: float) -> float:
         """Return the square root of the score; infinite where as many degrees of freedom as data are left."""
-        residual, free = self._residual(strength)
+        residual, used = self._residual(strength)
+        free = self._count - self._alike * used
         return float(np.sqrt(self._count * residual) / free) if free > 0 else np.inf
 
     def told(self, strengths: Sequence[float], strength: float, *notes: str) -> Smoothing:
         """Return what there is to know of ``strength``, and the scores of ``strengths``."""
-        residual, free = self._residual(strength)
+        residual, used = self._residual(strength)
+        free = self._count - self._alike * used
         noise = np.sqrt(residual / free) if free > 0 else np.nan
         scores = [self._score(s) for s in strengths]
         noise, *gcv = (self._unit * np.ldexp([noise, *scores], self._exponent)).tolist()
-        return Smoothing(strength, self._count - free, noise, np.array(strengths), np.array(gcv), notes)
+        return Smoothing(strength, used, noise, np.array(strengths), np.array(gcv), notes)
 
     def best(self) -> Smoothing:
         """Return the strength of least score."""

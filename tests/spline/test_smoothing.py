@@ -274,6 +274,34 @@ def test_smoothed_noise_is_nearer_to_the_truth_than_the_fit_and_the_data(sigma, 
     assert smoothing.notes == ()
 
 
+def test_noise_that_neighbours_share_is_smoothed_when_it_is_told(rng):
+    """Eight neighbours with one reading: cross-validation takes what they share for a feature, unless told."""
+    truth, (_, *rest) = _noisy(rng, 0.0)
+    coarse = rng.normal(size=[-(-m // 2) for m in truth.shape[:-1]] + [truth.shape[-1]])
+    shared = coarse
+    for a, m in enumerate(truth.shape[:-1]):
+        shared = np.take(np.repeat(shared, 2, axis=a), np.arange(m), axis=a)
+    values, weights = truth + 0.1 * shared, np.ones(truth.shape[:-1])
+
+    def error(independent: float | None) -> float:
+        spline = smooth(values, weights, *rest, independent=independent)[0].spline
+        return float(np.sqrt(np.mean((spline.evaluate_grid(rest[0]) - truth) ** 2)))
+
+    assert error(coarse[..., 0].size) < 0.8 * error(None)
+    assert (
+        choose_strength(values, weights, *rest, independent=1e9).strength
+        == choose_strength(values, weights, *rest).strength
+    )
+
+
+@pytest.mark.parametrize("independent", [0.0, -1, np.nan, np.inf, "8", [8]])
+def test_numbers_of_independent_data_that_are_none_are_refused(independent):
+    u = np.linspace(0, 1, 6)
+    rest = np.ones((6, 1)), np.ones(6), [u], [clamped([], 3)], [3]
+    for door in (choose_strength, smooth):
+        assert "independent" in refusal(lambda door=door: door(*rest, independent=independent))
+
+
 @pytest.mark.parametrize("sigma", [0.01, 0.1])
 def test_the_noise_is_that_of_the_weighted_residual(sigma, rng):
     """Weights that are inverse variances, in any unit."""
