@@ -1,7 +1,7 @@
 """The few verbs of the Python surface, composed from the rooms."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
@@ -14,13 +14,13 @@ from bvbedit.brdf.fit import AUTO, THOROUGH_ROUNDS, fit_net, is_published, settl
 from bvbedit.brdf.losses import Loss, loss_named
 from bvbedit.brdf.metrics import Comparison, compare, estimate
 from bvbedit.brdf.noise import estimate_noise
-from bvbedit.brdf.plan import Plan, Trial, checked_degrees, checked_placement, checked_size, plan, try_charts
-from bvbedit.brdf.problem import Weights, tabulate
+from bvbedit.brdf.plan import Plan, checked_degrees, checked_placement, checked_size, plan, try_charts
+from bvbedit.brdf.problem import Weights, charts_for, tabulate
 from bvbedit.brdf.samples import Samples, draw_samples
 from bvbedit.brdf.sizing import Step, error_curve, knee, points_for, sufficient
 from bvbedit.brdf.soundness import soundness
 from bvbedit.brdf.spline_brdf import SplineBrdf
-from bvbedit.brdf.storage import PRECISIONS
+from bvbedit.brdf.storage import PRECISIONS, storage_named
 from bvbedit.errors import BvbError
 from bvbedit.io import load, save
 from bvbedit.io.budget import file_bytes, first_guess, kept_within, payload_bytes, size_within
@@ -91,8 +91,8 @@ def fit(
 
     ``metric`` names what is to be small: ``log_cosine_rms``, ``fores`` or ``relative_l1``. ``weights``, a function of
     chart parameters (n, 3) that returns (n,) >= 0, multiplies the weights that follow from it. ``precision``:
-    ``quantised`` (``auto``, but ``float32`` in the paper's configuration; the step is meant to add 4 % to the error, 1
-    to 15 % were seen), ``float16``, ``float32`` or ``float64``.
+    ``quantised`` (``auto``, but ``float32`` in the paper's configuration; it adds 4 % to the error), ``float16``,
+    ``float32`` or ``float64``.
     ``smoothing`` penalises differences of the net, for noisy data: a strength, or ``auto`` for the one that generalised
     cross-validation finds. ``thorough`` takes more steps on the metric itself and seconds longer. ``source`` names the
     data in the report, whose bytes count too.
@@ -121,6 +121,14 @@ def fit(
     if size is not None:
         size = checked_size(size)
 
+    noise = estimate_noise(brdf, wish.loss)
+    if size is not None:
+        wish = replace(wish, charts=charts_for(brdf, wish.charts, size))
+        if len(wish.charts) == 1 and is_published(wish.charts[0], wish.encodings[0], wish.knots):
+            model = fit_net(brdf, wish.charts[0], wish.encodings[0], size=size, degrees=wish.degrees, knots=wish.knots)
+            stored = storage_named(wish.precision, model.spline.control)
+            model = model.stored_as(stored).told(source=wish.source, noise=noise.to_dict())
+            return _measured(model, brdf, start)
     budget = max_bytes if max_bytes is not None else max_payload
     if size is not None:
         points = int(np.prod(size))
@@ -143,21 +151,36 @@ def fit(
         placement=wish.knots,
         points=largest,
         weights=weights,
+        surrogate=best.surrogate,
     )
+    # What the chart averages out of what is fitted is still in the data that nets are judged by.
+    averaged = best.chart.reciprocal and wish.loss.power == 2
+    floor = (noise.grid, noise.nodes) if averaged else (0.0, 0.0)
+
+    def told(model: SplineBrdf, curve: list[Step]) -> SplineBrdf:
+        return model.told(
+            noise=noise.to_dict(), tried=[t.to_dict() for t in trials], curve=[step.to_dict() for step in curve]
+        )
+
+    if budget is not None:
+        count = file_bytes if max_bytes is not None else payload_bytes
+        curve = error_curve(made, samples, int(np.prod(size_within(made, samples, budget, wish.precision, count))))
+        size = sufficient(curve, floor).size
+        while True:
+            model = told(_settled(brdf, made, size, wish, samples, progress), curve)
+            kept = kept_within(model, budget, count, lambda stored: _measured(stored, brdf, start))
+            if kept is not None:
+                return kept
+            size = _smaller(made, size, budget / count(model), budget)
     if size is not None:
         model = _settled(brdf, made, size, wish, samples, progress)
-        curve = error_curve(made, samples, points)
-    elif budget is not None:
-        count = file_bytes if max_bytes is not None else payload_bytes
-        model, curve = _within(brdf, made, wish, samples, budget, count, trials, start, progress)
-        return model
+        return _measured(told(model, error_curve(made, samples, points)), brdf, start)
+    curve = error_curve(made, samples, LARGEST_KNEE)
+    if tolerance is None:
+        model = _settled(brdf, made, knee(curve, floor).size, wish, samples, progress)
     else:
-        curve = error_curve(made, samples, LARGEST_KNEE)
-        if tolerance is None:
-            model = _settled(brdf, made, knee(curve, _noise_of(brdf, made)).size, wish, samples, progress)
-        else:
-            model = _to_tolerance(brdf, made, wish, samples, tolerance, curve, progress)
-    return _told(model, brdf, trials, curve, start)
+        model = _to_tolerance(brdf, made, wish, samples, tolerance, curve, progress)
+    return _measured(told(model, curve), brdf, start)
 
 
 def _checked(
@@ -233,7 +256,9 @@ def _settled(
             model, errors = freed, better
         notes = [*model.report["notes"], f"free knots: {gain:.3g} times the error of dominant points, {_kept(gain)}"]
         model = model.told(notes=notes)
-    return model.stored_as(made.storage(wish.precision, errors)).told(knots=wish.knots, source=wish.source)
+    return model.stored_as(made.storage(wish.precision, model.spline, samples)).told(
+        knots=wish.knots, source=wish.source
+    )
 
 
 def _settled_over(
@@ -248,38 +273,12 @@ def _kept(gain: float) -> str:
     return "kept" if gain < 1 else "left"
 
 
-def _within(
-    brdf: Brdf,
-    made: Plan,
-    wish: _Wish,
-    samples: Samples,
-    budget: int,
-    count: Callable[[SplineBrdf], int],
-    trials: list[Trial],
-    start: float,
-    progress: Callable[[float], None] | None,
-) -> tuple[SplineBrdf, list[Step]]:
-    """Return the model that keeps within a budget, its report included."""
-    size = size_within(made, samples, budget, wish.precision, count)
-    curve = error_curve(made, samples, int(np.prod(size)))
-    size = sufficient(curve, _noise_of(brdf, made)).size
-    while True:
-        model = _told(_settled(brdf, made, size, wish, samples, progress), brdf, trials, curve, start)
-        kept = kept_within(model, budget, count)
-        if kept is not None:
-            return kept, curve
-        smaller = made.walk(int(np.prod(size) * 0.98 * budget / count(model)))[-1]
-        if np.prod(smaller) >= np.prod(size):
-            raise BvbError(f"{budget} bytes hold no net of degrees {wish.degrees} and its report. Allow more.")
-        size = smaller
-
-
-def _noise_of(brdf: Brdf, made: Plan) -> tuple[float, float]:
-    """Return the noise of what errors are measured by, where the chart averages it out of what is fitted."""
-    if not made.problem.chart.reciprocal or made.problem.loss.power != 2:
-        return 0.0, 0.0
-    found = estimate_noise(brdf, made.problem.loss)
-    return found.grid, found.nodes
+def _smaller(made: Plan, size: Sequence[int], share: float, budget: int) -> tuple[int, ...]:
+    """Return a net of about ``share`` of the control points of ``size``. Raises BvbError where there is none."""
+    smaller = made.walk(int(np.prod(size) * 0.98 * share))[-1]
+    if np.prod(smaller) >= np.prod(size):
+        raise BvbError(f"{budget} bytes hold no net of degrees {made.degrees} and its report. Allow more.")
+    return smaller
 
 
 def _to_tolerance(
@@ -320,22 +319,9 @@ def _to_tolerance(
     return good
 
 
-def _told(model: SplineBrdf, brdf: Brdf, trials: list[Trial], curve: list[Step], start: float) -> SplineBrdf:
-    """Return the model with a report of how it was chosen and how good it is."""
+def _measured(model: SplineBrdf, brdf: Brdf, start: float) -> SplineBrdf:
+    """Return the model with a report of how good it is as stored, and of the time since ``start``."""
     stored = model.with_spline(model.spline.with_control(model.storage.rounded(model.spline.control)))
     return model.told(
-        metrics=estimate(stored, brdf).to_dict(),
-        soundness=soundness(stored, brdf),
-        noise=estimate_noise(brdf, loss_named(model.report.get("metric", "log_cosine_rms"))).to_dict(),
-        tried=[
-            {
-                "chart": t.chart.name,
-                "encoding": t.encoding.name,
-                "grid": float(f"{t.errors[0]:.3g}"),
-                "nodes": float(f"{t.errors[1]:.3g}"),
-            }
-            for t in trials
-        ],
-        curve=[step.to_dict() for step in curve],
-        seconds=perf_counter() - start,
+        metrics=estimate(stored, brdf).to_dict(), soundness=soundness(stored, brdf), seconds=perf_counter() - start
     )

@@ -219,6 +219,38 @@ def test_weights_lower_the_error_where_they_are():
     assert rms(focused, ~inside) > rms(plain, ~inside)
 
 
+def test_smoothing_brings_a_large_net_nearer_to_what_noise_hides():
+    """The finest net that the data carry follows their noise, unless its differences are penalised."""
+    truth, table, options = material_named("satin-paint").brdf, _measured(), {"size": (40, 40, 12), **SHARP}
+    plain, found, given = (bvbedit.fit(table, smoothing=s, **options) for s in (None, "auto", 1e-3))
+    strength = found.report["smoothing"]["strength"]
+    assert strength > 0
+    assert found.report["smoothing"]["degrees_of_freedom"] < 0.8 * 40 * 40 * 12
+    assert given.report["smoothing"]["strength"] == 1e-3
+    errors = [
+        np.prod([getattr(estimate(m, truth), s).log_cosine_rms for s in ("grid", "nodes")]) for m in (plain, found)
+    ]
+    assert errors[1] < 0.9 * errors[0]
+
+
+def test_the_published_configuration_is_fitted_without_trials():
+    options = {"chart": "in-out", "encoding": "linear", "knots": "piegl-tiller"}
+    model = bvbedit.fit(_measured(), size=(6, 6, 9), source="satin.binary", **options)
+    assert model.report["solver"] == "lofting"
+    assert model.report["source"] == "satin.binary"
+    assert "tried" not in model.report
+    assert set(model.report["metrics"]) == {"grid", "nodes", "paper"}
+    assert model.storage.precision == "float32"
+    assert bvbedit.fit(_measured(), size=(6, 6, 9), precision="quantised", **options).storage.step > 0
+
+
+def test_a_size_that_one_chart_carries_is_fitted_in_that():
+    model = bvbedit.fit(_measured(), size=(8, 8, 70))
+    assert model.chart is IN_OUT
+    assert {t["chart"] for t in model.report["tried"]} == {"in-out"}
+    assert "Choose at most" in refusal(lambda: bvbedit.fit(_measured(), size=(8, 8, 152)))
+
+
 @functools.cache
 def _fitted_for(metric: str) -> SplineBrdf:
     return bvbedit.fit(measured("satin-paint"), metric=metric, size=(20, 14, 6), **SHARP)

@@ -80,6 +80,7 @@ def fit_net(
         placement=knots,
         points=max(size) ** 3,
         weights=weights,
+        surrogate=trial.surrogate,
     )
     if knots == "free":
         made = made.freed(size)
@@ -118,7 +119,7 @@ def fit_over(
     vectors = tuple(checked_knots(t, p) for t, p in zip(given, degrees, strict=True))
     points = math.prod(len(t) - p - 1 for t, p in zip(vectors, degrees, strict=True))
     (trial,) = try_charts(brdf, [chart], [encoding], loss, degrees=degrees, points=points)
-    problem = pose(tabulate(brdf, chart), encoding, loss, trial.balance)
+    problem = pose(tabulate(brdf, chart), encoding, loss, trial.balance, surrogate=trial.surrogate)
     lines = axis_lines(problem.values, problem.weights, problem.table.axes)
     model = _settle_over(brdf, problem, lines, vectors, degrees, progress=progress)
     return model.told(knots="given", seconds=perf_counter() - start)
@@ -189,6 +190,8 @@ def _settle_over(
             degrees,
             project=project,
             strength=None if isinstance(smoothing, str) else smoothing,
+            # What the chart folds onto one node are so many readings for one datum.
+            independent=None if brdf.readings is None else max(1.0, brdf.readings / len(problem.table.sides)),
             progress=progress,
         )
         model = _reported(smoothed, smoothed.spline, problem.table, problem.encoding, "smoothing")

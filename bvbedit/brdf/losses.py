@@ -42,12 +42,12 @@ class Loss(ABC):
         """Return the metric itself for a ``norm`` of errors from ``target`` (N, 3), the true T."""
         return norm
 
-    def reweighting(self, error: Floats) -> Floats:
-        """Return |error|^(power - 2) of errors of T, relative to that of their mean; ones where the power is 2."""
+    def reweighting(self, error: Floats, mean: float | None = None) -> Floats:
+        """Return |error|^(power - 2) of errors of T, relative to that of their ``mean`` size; ones for the power 2."""
         if self.power == 2:
             return np.ones_like(error)
         size = np.abs(error)
-        mean = max(float(size.mean()), np.finfo(float).tiny)
+        mean = max(float(size.mean()) if mean is None else mean, np.finfo(float).tiny)
         return np.asarray(np.maximum(size / mean, SMALLEST_SHARE) ** (self.power - 2))
 
     def expected(self, f: Floats, cos_i: Floats, cos_o: Floats) -> Floats:

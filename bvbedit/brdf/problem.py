@@ -18,12 +18,11 @@ from bvbedit.brdf.measured import MeasuredBrdf, hold
 from bvbedit.brdf.sample_sets import HIGHEST_ELEVATION, HORIZON_MARGIN, LARGEST_REFLECTANCE, densities, draw
 from bvbedit.errors import BvbError
 from bvbedit.spline.arguments import real_array, shown
+from bvbedit.threads import each_block
 
 Weights = Callable[[Floats], Floats]
 
 MIRROR = np.array([1.0, -1.0, 1.0])
-# Layers of the first axis that are looked up at once.
-LAYERS = 12
 # Variances below this share of the square of the value are rounding.
 ROUNDING = 1e-12
 # Densities on the faces of a chart are taken so much of a node's distance inside.
@@ -63,6 +62,9 @@ class Problem:
     table: Table
     encoding: Encoding
     loss: Loss
+    """The metric that is to be small."""
+    surrogate: Loss
+    """The metric whose weights least squares is given."""
     balance: tuple[float, float]
     """What an error over each of the sample sets counts."""
     values: Floats
@@ -90,34 +92,55 @@ def tabulate(
     """
     if isinstance(brdf, MeasuredBrdf) and brdf.chart is chart:
         return _own(brdf, chart)
-    axes = chart.fitting_grid if axes is None else axes
+    axes = grid_of(brdf, chart) if axes is None else axes
     shape = tuple(len(u) for u in axes)
-    reflected = 2 if mirrored and tells_mirrored(brdf) else 1
-    count = reflected * (2 if mirrored and chart.reciprocal and not brdf.reciprocal else 1)
-    sides = tuple(np.empty((*shape, 3)) for _ in range(count))
-    trusted = tuple(np.empty(shape, dtype=bool) for _ in range(count))
+    alike: list[Callable[[Floats, Floats], tuple[Floats, Floats]]] = [lambda i, o: (i, o)]
+    # Exchanging wi and wo exchanges theta_i and theta_o and mirrors the pair: of a reciprocal BRDF one side tells both.
+    exchanged = chart is IN_OUT and brdf.reciprocal and np.array_equal(axes[0], axes[1])
+    if mirrored and tells_mirrored(brdf) and not exchanged:
+        alike += [lambda i, o: (i * MIRROR, o * MIRROR)]
+    if mirrored and chart.reciprocal and not brdf.reciprocal:
+        alike += [lambda i, o, pair=pair: pair(o, i) for pair in tuple(alike)]  # type: ignore[misc]
+    sides = tuple(np.empty((*shape, 3)) for _ in alike)
+    trusted = tuple(np.empty(shape, dtype=bool) for _ in alike)
     cosines = np.empty((*shape, 1)), np.empty((*shape, 1))
-    # A few layers at once keep the directions in megabytes.
-    for start in range(0, shape[0], LAYERS):
-        part = slice(start, start + LAYERS)
-        layers = (len(axes[0][part]), *shape[1:])
+
+    def look_up(part: slice) -> None:
+        layers = (part.stop - part.start, *shape[1:])
         wi, wo = chart.to_directions(grid_points((axes[0][part], *axes[1:])))
         # A pair that is lifted off the horizon is another pair: it fills the node, and carries no weight.
         unmoved = np.minimum(wi[:, 2], wo[:, 2]) >= np.sin(HORIZON_MARGIN)
         wi, wo = off_horizon(wi), off_horizon(wo)
         for cosine, w in zip(cosines, (wi, wo), strict=True):
             cosine[part] = _cosine(w).reshape(*layers, 1)
-        pairs = [(wi, wo), (wi * MIRROR, wo * MIRROR)][:reflected]
-        pairs += [(o, i) for i, o in pairs][: count - len(pairs)]
-        for k, (i, o) in enumerate(pairs):
-            f, backed = brdf.evaluate_unit(i, o)
-            sides[k][part] = np.minimum(f, LARGEST_REFLECTANCE, out=f).reshape(*layers, 3)
-            trusted[k][part] = (backed & unmoved).reshape(layers)
-    shares = np.full((2, count), 1 / count)
-    if reflected > 1 and not chart.reciprocal:
+        for side, backing, pair in zip(sides, trusted, alike, strict=True):
+            f, backed = brdf.evaluate_unit(*pair(wi, wo))
+            side[part] = np.minimum(f, LARGEST_REFLECTANCE, out=f).reshape(*layers, 3)
+            backing[part] = (backed & unmoved).reshape(layers)
+
+    each_block(shape[0], shape[1] * shape[2], look_up)
+    if mirrored and tells_mirrored(brdf) and exchanged:
+        sides, trusted = (*sides, sides[0].swapaxes(0, 1)), (*trusted, trusted[0].swapaxes(0, 1))
+    shares = np.full((2, len(sides)), 1 / len(sides))
+    if len(sides) > 1 and not chart.reciprocal:
         shares[:] = [_sidedness(brdf, s) for s in (0, 1)]
     clamped = brdf.clamped if isinstance(brdf, MeasuredBrdf) else 0.0
     return _checked(Table(chart, axes, sides, trusted, densities(chart, axes, INSIDE), shares, cosines, clamped))
+
+
+def grid_of(brdf: Brdf, chart: Chart) -> tuple[Floats, Floats, Floats]:
+    """Return the axes of the grid of ``chart`` on which ``brdf`` is fitted."""
+    return brdf.axes if isinstance(brdf, MeasuredBrdf) and brdf.chart is chart else chart.fitting_grid
+
+
+def charts_for(brdf: Brdf, charts: Sequence[Chart], size: Sequence[int]) -> tuple[Chart, ...]:
+    """Return those of the ``charts`` whose grids carry ``size`` control points. Raises BvbError where none does."""
+    carried = {c: [len(u) for u in grid_of(brdf, c)] for c in charts}
+    able = tuple(c for c, most in carried.items() if all(n <= m for n, m in zip(size, most, strict=True)))
+    if not able:
+        limits = ", ".join(f"{' x '.join(map(str, most))} in {c.name}" for c, most in carried.items())
+        raise BvbError(f"{shown(list(size))} control points are more than the data carry. Choose at most {limits}.")
+    return able
 
 
 def tells_mirrored(brdf: Brdf) -> bool:
@@ -183,37 +206,50 @@ def off_horizon(w: Floats) -> Floats:
 
 
 def pose(
-    table: Table, encoding: Encoding, loss: Loss, balance: Sequence[float], weights: Weights | None = None
+    table: Table,
+    encoding: Encoding,
+    loss: Loss,
+    balance: Sequence[float],
+    weights: Weights | None = None,
+    surrogate: Loss | None = None,
 ) -> Problem:
     """Return the least-squares problem for a table.
 
-    ``balance``: what an error over each of the sets counts. ``weights`` (n, 3) -> (n,) multiplies the weights built in.
+    ``balance``: what an error over each of the sets counts. ``weights`` (n, 3) -> (n,) multiplies the weights built in,
+    which are those of the metric ``surrogate``, or of ``loss`` itself.
     Raises BvbError where these are not finite, negative, all zero, or of another shape.
     """
     shape = table.densities.shape[1:]
-    wanted = [lam * d for lam, d in zip(balance, table.densities, strict=True)]
     mean = float(sum(balance))
-    parts = [
-        np.where(trusted, sum(s * w for s, w in zip(share, wanted, strict=True)) + BEYOND * mean / len(table.sides), 0)
-        for trusted, share in zip(table.trusted, table.shares.T, strict=True)
-    ]
-    density = np.sum(parts, axis=0)
+    tells = table.chart.reciprocal and len(table.sides) > 1
+    values, density = np.empty_like(table.sides[0]), np.empty(shape)
+    variance = np.empty(shape) if tells else None
+
+    def average(part: slice) -> None:
+        wanted = [lam * d[part] for lam, d in zip(balance, table.densities, strict=True)]
+        parts = [
+            np.where(trusted[part], sum(s * w for s, w in zip(share, wanted, strict=True)) + BEYOND * mean / count, 0.0)
+            for trusted, share in zip(table.trusted, table.shares.T, strict=True)
+        ]
+        density[part] = np.sum(parts, axis=0)
+        filled = np.where(density[part] > 0, density[part], 1.0)[..., None]
+        mixed, squares = np.zeros_like(values[part]), np.zeros_like(density[part])
+        for weight, side in zip(parts, table.sides, strict=True):
+            y = encoding.encode(side[part])
+            y_share = (weight[..., None] / filled) * y
+            mixed += y_share
+            if tells:
+                squares += np.einsum("...c,...c->...", y, y_share)
+        values[part] = mixed
+        if variance is not None:
+            # Of the mean over k sides, from their spread; a single side tells nothing.
+            others = np.maximum(np.sum([t[part] for t in table.trusted], axis=0) - 1, 1)
+            found = np.maximum(squares - np.einsum("...c,...c->...", mixed, mixed), 0.0) / others
+            variance[part] = np.where(found < ROUNDING * squares, 0.0, found)
+
+    count, rows = len(table.sides), shape[1] * shape[2]
+    each_block(shape[0], rows, average)
     known = density > 0
-    filled = np.where(known, density, 1.0)[..., None]
-    values, squares = np.zeros_like(table.sides[0]), np.zeros(shape)
-    tells = table.chart.reciprocal and len(parts) > 1
-    for part, side in zip(parts, table.sides, strict=True):
-        y = encoding.encode(side)
-        share = part[..., None] / filled
-        values += share * y
-        if tells:
-            squares += np.einsum("...c,...c->...", y, share * y)
-    variance = None
-    if tells:
-        # Of the mean over k sides, from their spread; a single side tells nothing.
-        others = np.maximum(np.sum(table.trusted, axis=0) - 1, 1)
-        variance = np.maximum(squares - np.einsum("...c,...c->...", values, values), 0.0) / others
-        variance[variance < ROUNDING * squares] = 0.0
     if not known.all():
         values = hold(values, known, table.chart.hold_order)
     density = np.where(known, density, HELD * mean)
@@ -223,14 +259,34 @@ def pose(
         if not density.any():
             raise BvbError("weights are zero at all nodes. Return numbers above zero where the model is to be good.")
         density = density * (total / density.sum())
-    f = encoding.decode(values)
-    slope = loss.slope(f, *table.cosines) * encoding.slope(values)
+    surrogate = loss if surrogate is None else surrogate
+    weight = density * _squared_slopes(table, encoding, surrogate, values)
+    return Problem(table, encoding, loss, surrogate, (float(balance[0]), float(balance[1])), values, weight, variance)
+
+
+def _squared_slopes(table: Table, encoding: Encoding, loss: Loss, values: Floats) -> Floats:
+    """Return the mean over channels (m_0, m_1, m_2) of (T'(f) f'(y))^2, for a power other than 2 reweighted."""
+    shape = values.shape[:-1]
+    squared = np.empty(shape)
+
+    def expected(part: slice) -> Floats:
+        return loss.expected(encoding.decode(values[part]), *(c[part] for c in table.cosines))
+
+    rows = shape[1] * shape[2]
+    size = 1.0
     if loss.power != 2:
-        slope = slope * np.sqrt(loss.reweighting(loss.expected(f, *table.cosines)))
-    squared = np.einsum("...c,...c->...", slope, slope) / 3
+        size = sum(each_block(shape[0], rows, lambda part: float(np.abs(expected(part)).sum()))) / values.size
+
+    def fill(part: slice) -> None:
+        y = values[part]
+        slope = loss.slope(encoding.decode(y), *(c[part] for c in table.cosines)) * encoding.slope(y)
+        if loss.power != 2:
+            slope = slope * np.sqrt(loss.reweighting(expected(part), size))
+        squared[part] = np.einsum("...c,...c->...", slope, slope) / 3
+
+    each_block(shape[0], rows, fill)
     # Where all channels are black their slope may be zero: the model is to be black there too.
-    squared = np.maximum(squared, 1e-9 * squared.max()) if squared.any() else np.ones_like(squared)
-    return Problem(table, encoding, loss, (float(balance[0]), float(balance[1])), values, density * squared, variance)
+    return np.maximum(squared, 1e-9 * squared.max()) if squared.any() else np.ones(shape)
 
 
 def checked_weights(weights: Weights, points: Floats) -> Floats:

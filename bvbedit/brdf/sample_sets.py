@@ -13,6 +13,7 @@ from bvbedit.brdf.base import BLOCK, Brdf
 from bvbedit.brdf.charts import IN_OUT, RUSINKIEWICZ, Chart, Rusinkiewicz, grid_points
 from bvbedit.brdf.geometry import Bools, Floats
 from bvbedit.brdf.measured import MeasuredBrdf
+from bvbedit.threads import each_block
 
 # The horizon itself, where reflectance need not exist, is looked at from this far above (radians).
 HORIZON_MARGIN = 1e-4
@@ -100,14 +101,19 @@ def densities(chart: Chart, axes: tuple[Floats, Floats, Floats], inside: float) 
     where that is 0/0 or infinite it is taken ``inside`` of a node's distance from the face: about the mean of a cell.
     """
     margins = np.array([inside / max(len(u) - 1, 1) for u in axes])
-    points = np.clip(grid_points(axes), margins, 1 - margins)
-    wi, wo = chart.to_directions(points)
-    looked_at = np.minimum(wi[:, 2], wo[:, 2]) >= np.cos(HIGHEST_ELEVATION + np.pi / 2 * margins.max())
-    out = []
-    for of in (IN_OUT, RUSINKIEWICZ):
-        density = np.ones(len(points))
-        if of is not chart:
-            density = chart.jacobian(points) / of.jacobian(np.clip(of.to_parameters(wi, wo), margins, 1 - margins))
-        density[~looked_at] = 0.0
-        out.append((density / density.mean()).reshape([len(u) for u in axes]))
-    return np.stack(out)
+    shape = tuple(len(u) for u in axes)
+    out = np.ones((2, *shape))
+
+    def fill(part: slice) -> None:
+        points = np.clip(grid_points((axes[0][part], *axes[1:])), margins, 1 - margins)
+        wi, wo = chart.to_directions(points)
+        looked_at = np.minimum(wi[:, 2], wo[:, 2]) >= np.cos(HIGHEST_ELEVATION + np.pi / 2 * margins.max())
+        for density, of in zip(out, (IN_OUT, RUSINKIEWICZ), strict=True):
+            found = looked_at.astype(np.float64)
+            if of is not chart:
+                there = np.clip(of.to_parameters(wi, wo), margins, 1 - margins)
+                found *= chart.jacobian(points) / of.jacobian(there)
+            density[part] = found.reshape(-1, *shape[1:])
+
+    each_block(shape[0], shape[1] * shape[2], fill)
+    return np.asarray(out / out.mean(axis=(1, 2, 3), keepdims=True))

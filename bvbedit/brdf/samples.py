@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bvbedit.brdf.base import Brdf
 from bvbedit.brdf.charts import Chart
@@ -13,12 +14,16 @@ from bvbedit.brdf.problem import Weights, checked_weights
 from bvbedit.brdf.sample_sets import LARGEST_REFLECTANCE, Pairs, draw
 from bvbedit.spline.tensor import TensorSpline
 
+Indices = NDArray[np.int64]
+
 # Pairs drawn from each set: at least so many, and so many for each control point.
 FEWEST = 100_000
 FOR_EACH_POINT = 6
 MOST = 600_000
 # Of these every so many-th is kept aside to judge a step by: samples that noise fills are easily followed too closely.
 JUDGE = 5
+# Cells of each axis in whose order samples are fitted: a pass over them meets control points that are in the cache.
+CELLS = 32
 
 
 @dataclass(frozen=True)
@@ -95,22 +100,29 @@ def in_chart(reflectance: Reflectance, chart: Chart, weights: Weights | None = N
 
 
 def split(samples: Samples) -> tuple[Samples, Samples]:
-    """Return the samples to fit and those to judge by."""
+    """Return the samples to fit, neighbours in the chart next to one another, and those to judge by."""
     judging = np.arange(len(samples.parameters)) % JUDGE == 0
-    out = []
-    for chosen in (~judging, judging):
-        count = int(np.count_nonzero(chosen[samples.parts[0]]))
-        total = int(np.count_nonzero(chosen))
-        out.append(
-            Samples(
-                samples.parameters[chosen],
-                samples.reflectance[chosen],
-                (samples.cosines[0][chosen], samples.cosines[1][chosen]),
-                (slice(0, count), slice(count, total)),
-                samples.weights[chosen],
-            )
-        )
-    return out[0], out[1]
+    cells = np.minimum((CELLS * samples.parameters).astype(np.int64), CELLS - 1) @ [CELLS * CELLS, CELLS, 1]
+    fitted, judged = [], []
+    for part in samples.parts:
+        places = np.arange(part.start, part.stop)
+        chosen = places[~judging[part]]
+        # Of equals the first comes first, whatever the sort.
+        fitted.append(chosen[np.argsort(cells[chosen] * len(cells) + chosen)])
+        judged.append(places[judging[part]])
+    return _taken(samples, fitted), _taken(samples, judged)
+
+
+def _taken(samples: Samples, places: list[Indices]) -> Samples:
+    """Return the samples at the ``places`` of each set."""
+    at, count = np.concatenate(places), len(places[0])
+    return Samples(
+        samples.parameters[at],
+        samples.reflectance[at],
+        (samples.cosines[0][at], samples.cosines[1][at]),
+        (slice(0, count), slice(count, len(at))),
+        samples.weights[at],
+    )
 
 
 def samples_for(points: int) -> int:

@@ -18,13 +18,17 @@ from bvbedit.io.bvb import dumps
 # Bytes that a control point of three channels takes, to begin with.
 BYTES_OF_POINT = {"float16": 5.5, "float32": 11.0, "float64": 22.0, "quantised": 1.9}
 TRIES = 6
-CLOSE_ENOUGH = 0.98
+CLOSE_ENOUGH, AIM = 0.97, 0.985
 # Shares of the step that are tried where bytes are left, and where they are lacking: beyond the last one, fewer control
 # points are better.
 SMALLER_STEPS = (1 / 8, 1 / 4, 1 / 2)
 LARGER_STEPS = (1.05, 1.1, 1.15, 1.2, 1.25, 1.3, 1.4, 1.5)
+# Half the step adds a bit to each number, of which deflation leaves between so much:
+LEAST_BITS, MOST_BITS = 0.6, 1.1
 # What a report adds to a file, as long as it is not written: the quick fits that estimate a size have none.
 REPORT_BYTES = 1100
+# Of that, what is measured of the stored model.
+MEASURED_BYTES = 500
 
 Bytes = Callable[[SplineBrdf], int]
 
@@ -54,11 +58,12 @@ def size_within(made: Plan, samples: Samples, budget: int, precision: str, count
 
     def taken(size: tuple[int, ...]) -> int:
         spline = made.lofted(size)
-        storage = made.storage(precision, samples.errors_of(spline, problem.encoding, problem.loss))
+        storage = made.storage(precision, spline, samples)
         return count(SplineBrdf(spline, problem.chart, problem.encoding, storage=storage))
 
     points = first_guess(allowance, precision)
     found: tuple[int, ...] | None = None
+    before: tuple[int, int] | None = None
     for _ in range(TRIES):
         walk = made.walk(max(points, 1))
         size, full = walk[-1], len(walk) > 1 or np.prod(walk[0]) <= points
@@ -71,7 +76,13 @@ def size_within(made: Plan, samples: Samples, budget: int, precision: str, count
             break
         if used < allowance and np.prod(size) < 0.9 * points:
             break  # the data carry no more
-        points = int(np.prod(size) * 0.99 * allowance / used)
+        # Finer nets have smaller steps, so that bytes grow faster than control points: a power, from the last two.
+        tried, growth = int(np.prod(size)), 1.0
+        if before is not None and before[0] != tried:
+            growth = float(np.clip(np.log(used / before[1]) / np.log(tried / before[0]), 1.0, 2.0))
+        points, before = int(tried * (AIM * allowance / used) ** (1 / growth)), (tried, used)
+        if made.walk(max(points, 1))[-1] == size:
+            break
     if found is None:
         smallest = made.walk(1)[0]
         need = taken(smallest)
@@ -84,15 +95,38 @@ def size_within(made: Plan, samples: Samples, budget: int, precision: str, count
     return found
 
 
-def kept_within(model: SplineBrdf, budget: int, count: Bytes) -> SplineBrdf | None:
-    """Return ``model`` stored in at most ``budget`` bytes, or None where that would cost more than it is worth."""
-    fits = count(model) <= budget
-    step = model.storage.step
+def kept_within(
+    model: SplineBrdf, budget: int, count: Bytes, measured: Callable[[SplineBrdf], SplineBrdf] | None = None
+) -> SplineBrdf | None:
+    """Return ``model`` stored in at most ``budget`` bytes, or None where that would cost more than it is worth.
+
+    ``measured`` adds to the report what is known only when it is stored; these bytes count too.
+    """
+    if measured is None:
+        return _stored_within(model, budget, count)
+    allowance = budget - (MEASURED_BYTES if count is file_bytes else 0)
+    for _ in range(TRIES):
+        stored = _stored_within(model, allowance, count)
+        if stored is None:
+            return None
+        told = measured(stored)
+        excess = count(told) - budget
+        if excess <= 0:
+            return told
+        allowance -= excess
+    return None
+
+
+def _stored_within(model: SplineBrdf, budget: int, count: Bytes) -> SplineBrdf | None:
+    used, step = count(model), model.storage.step
+    fits = used <= budget
     if step is None:
         return model if fits else None
     # Bytes that control points have no use for make the step smaller.
-    for share in SMALLER_STEPS if fits else LARGER_STEPS:
-        restored = model.stored_as(Storage(model.storage.precision, step * share))
+    shares = np.array(SMALLER_STEPS if fits else LARGER_STEPS)
+    least = used - model.spline.control.size / 8 * np.log2(shares) * (LEAST_BITS if fits else MOST_BITS)
+    for share in shares[least <= budget]:
+        restored = model.stored_as(Storage(model.storage.precision, step * float(share)))
         if count(restored) <= budget:
             return restored
     return model if fits else None

@@ -17,9 +17,10 @@ import numpy as np
 
 from bvbedit.errors import BvbError
 from bvbedit.spline.arguments import is_whole, one_per_axis, real_array, shown
-from bvbedit.spline.banded import Banded
+from bvbedit.spline.banded import SMALLEST_PIVOT, Banded
 from bvbedit.spline.basis import collocation
-from bvbedit.spline.knots import Floats, checked_degree, clamped, increasing, place_knots
+from bvbedit.spline.knots import Floats, checked_degree, increasing, place_knots
+from bvbedit.threads import each_block
 
 # Weights below this share of the largest are raised to it: rows without weight would leave knots undetermined.
 WEIGHT_FLOOR = 1e-8
@@ -64,15 +65,22 @@ class AxisLines:
 
         Raises BvbError where the data do not determine a control point.
         """
-        matrix = self.collocation(knots, degree)
-        return self.factor - matrix.apply(matrix.solve(self.factor, 0), 0)
+        from bvbedit.spline import adaptive_kernels
+
+        residual = np.empty_like(self.factor)
+        if not adaptive_kernels.residual_left(
+            knots, degree, self.parameters, self.roots, self.factor, SMALLEST_PIVOT, residual
+        ):
+            raise BvbError(f"The data do not determine all control points over knots {shown(knots.tolist())}.")
+        return residual
 
     def error(self, knots: Floats, degree: int) -> float:
         """Return the squared norm of ``residual``, infinite where the data do not determine a control point."""
-        try:
-            return float(np.sum(self.residual(knots, degree) ** 2))
-        except BvbError:
-            return np.inf
+        from bvbedit.spline import adaptive_kernels
+
+        return float(
+            adaptive_kernels.error_left(knots, degree, self.parameters, self.roots, self.factor, SMALLEST_PIVOT)
+        )
 
 
 @dataclass(frozen=True)
@@ -142,18 +150,32 @@ def axis_lines(
         variance = None if variance is None else np.ldexp(variance, -2 * exponent)
     rows = marginals(weights)
     noise = np.zeros(shape) if variance is None else weights * variance
+
     out = []
     for a, u in enumerate(nodes):
         roots = np.sqrt(rows[a])
-        lines = np.sqrt(weights.mean(axis=a, keepdims=True) / weights.mean())[..., None]
-        table = np.moveaxis(values * lines, a, 0).reshape(len(u), -1) * roots[:, None]
-        gram = table @ table.T
+        scale = np.sqrt(weights.mean(axis=a, keepdims=True) / weights.mean())
+        gram = _gram(values, np.broadcast_to(scale[..., None], values.shape), a) * (roots[:, None] * roots)
         eigenvalues, vectors = np.linalg.eigh(gram)
         kept = np.cumsum(np.maximum(eigenvalues, 0.0)) > NEGLIGIBLE_ENERGY * max(np.trace(gram), np.finfo(float).tiny)
         kept[-1] = True
-        factor = vectors[:, kept] * np.sqrt(np.maximum(eigenvalues[kept], 0.0))
-        out.append(AxisLines(u, factor, roots, noise.sum(axis=tuple(b for b in range(len(nodes)) if b != a))))
+        factor = np.ascontiguousarray(vectors[:, kept] * np.sqrt(np.maximum(eigenvalues[kept], 0.0)))
+        others = tuple(b for b in range(len(nodes)) if b != a)
+        out.append(AxisLines(u, factor, roots, noise.sum(axis=others)))
     return tuple(out)
+
+
+def _gram(values: Floats, scale: Floats, axis: int) -> Floats:
+    """Return the Gram matrix (m, m) of the lines of ``values`` times ``scale`` (m_1, ..., m_d, c) along ``axis``."""
+    across = 1 if axis == 0 else 0
+
+    def gram_of(part: slice) -> Floats:
+        block = (slice(None),) * across + (part,)
+        lines = np.moveaxis(values[block] * scale[block], axis, 0).reshape(values.shape[axis], -1)
+        return np.asarray(lines @ lines.T)
+
+    layers = values.shape[across]
+    return np.asarray(sum(each_block(layers, values.size // (layers * values.shape[-1]), gram_of)))
 
 
 def marginals(weights: Floats) -> list[Floats]:
@@ -302,9 +324,11 @@ def _means(u: Floats, points: Sequence[int], degree: int) -> Floats:
     x = u[np.asarray(points)]
     if degree == 0:
         # Constant pieces end half-way between their points.
-        return clamped(0.5 * (x[:-1] + x[1:]), 0, u[0], u[-1])
-    means = np.lib.stride_tricks.sliding_window_view(x, degree).mean(axis=1)
-    return clamped(means[1 : len(points) - degree], degree, u[0], u[-1])
+        interior = 0.5 * (x[:-1] + x[1:])
+    else:
+        count = len(x) - degree - 1
+        interior = sum((x[1 + i : 1 + i + count] for i in range(1, degree)), x[1 : 1 + count]) / degree
+    return np.concatenate([np.full(degree + 1, u[0]), interior, np.full(degree + 1, u[-1])])
 
 
 def _inserted(knots: Floats, at: float, degree: int) -> Floats | None:

@@ -1,6 +1,6 @@
 """B-spline basis functions and their derivatives as (first index, values): never a dense row.
 
-Cox-de Boor in the triangular form of Piegl & Tiller, algorithm A2.2, for all points at once.
+Cox-de Boor in the triangular form of Piegl & Tiller, algorithm A2.2.
 """
 
 import numpy as np
@@ -38,16 +38,10 @@ def basis_derivatives(knots: Floats, degree: int, x: Floats, order: int) -> tupl
 
 
 def _values_on(span: Indices, knots: Floats, degree: int, x: Floats) -> Floats:
-    values = np.zeros((len(x), degree + 1))
-    values[:, 0] = 1.0
-    for j in range(1, degree + 1):
-        saved = np.zeros(len(x))
-        for r in range(j):
-            right, left = knots[span + r + 1], knots[span + r + 1 - j]
-            share = values[:, r] / (right - left)
-            values[:, r] = saved + (right - x) * share
-            saved = (x - left) * share
-        values[:, j] = saved
+    from bvbedit.spline import kernels
+
+    values = np.empty((len(x), degree + 1))
+    kernels.basis_at(knots, degree, span, np.ascontiguousarray(x), values)
     return values
 
 

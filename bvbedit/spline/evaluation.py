@@ -18,7 +18,7 @@ class Tables:
     """What finds a point's span and its basis functions quickly, for each axis."""
 
     bins: tuple[NDArray[np.int64], ...]
-    """The spans at the left ends of about four equal bins for each control point."""
+    """``span_bins`` of each axis."""
     polynomials: tuple[Floats, ...]
     """The basis functions of each span, (spans, p+1, p+1), in powers of (u - t_s)/(t_{s+1} - t_s)."""
 
@@ -27,9 +27,15 @@ def tables(knots: Sequence[Floats], degrees: Sequence[int]) -> Tables:
     """Return the tables of a spline over full clamped ``knots``."""
     axes = list(zip(knots, degrees, strict=True))
     return Tables(
-        tuple(find_spans(t, p, np.linspace(t[0], t[-1], 4 * (len(t) - p - 1) + 1)[:-1]) for t, p in axes),
+        tuple(span_bins(t, p) for t, p in axes),
         tuple(_polynomials(t, p) for t, p in axes),
     )
+
+
+def span_bins(knots: Floats, degree: int) -> NDArray[np.int64]:
+    """Return the spans at the left ends of about four equal bins for each control point."""
+    count = 4 * (len(knots) - degree - 1)
+    return find_spans(knots, degree, np.linspace(knots[0], knots[-1], count + 1)[:-1])
 
 
 def evaluate_cubic_rgb(knots: Sequence[Floats], made: Tables, control: Floats, x: Floats, out: Floats) -> None:

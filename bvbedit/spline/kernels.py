@@ -267,6 +267,13 @@ def basis_into(knots: Floats, degree: int, span: int, x: float, out: Floats) -> 
         out[j] = saved
 
 
+@kernel
+def basis_at(knots: Floats, degree: int, spans: Indices, points: Floats, out: Floats) -> None:
+    """Do what ``basis_into`` does for ``points`` (n,) in their ``spans`` (n,), into ``out`` (n, p + 1)."""
+    for n in range(len(points)):
+        basis_into(knots, degree, spans[n], points[n], out[n])
+
+
 @parallel_kernel
 def evaluate_any(
     points: Floats,

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from bvbedit.spline.basis import basis_values
+from bvbedit.spline.evaluation import span_bins
 from bvbedit.spline.knots import Floats
 
 # Nets in which sums are gathered side by side: as many as there are threads to expect, whatever there are.
@@ -16,24 +16,26 @@ PARTS = 4
 
 
 class ScatteredBasis:
-    """The basis functions of a volume at ``points`` (N, 3) within its knots."""
+    """The basis functions of a volume at ``points`` (N, 3) within its knots.
+
+    Neighbouring points should stand next to one another: in no order a pass takes up to twice as long.
+    """
 
     def __init__(self, points: Floats, knots: Sequence[Floats], degrees: Sequence[int]) -> None:
+        from bvbedit.spline import scattered_kernels
+
         self.size = tuple(len(t) - p - 1 for t, p in zip(knots, degrees, strict=True))
         self._counts = np.array([p + 1 for p in degrees])
         self._first = np.empty((len(points), 3), dtype=np.int64)
-        self._basis = np.empty((len(points), 3, max(degrees) + 1))
+        self._basis = np.zeros((len(points), 3, max(degrees) + 1))
         for a, (t, p) in enumerate(zip(knots, degrees, strict=True)):
-            first, values = basis_values(t, p, np.ascontiguousarray(points[:, a]))
-            self._first[:, a], self._basis[:, a, : p + 1] = first, values
+            scattered_kernels.basis_along(a, t, p, span_bins(t, p), points, self._first, self._basis)
 
     @property
     def overlap(self) -> float:
         """The mean sum of squares of the basis functions at a point: the trace of the normal matrix for each point."""
-        squares = [
-            np.sum(self._basis[:, a, :count] ** 2, axis=1) for a, count in enumerate(self._counts)
-        ]  # fmt: skip
-        return float(np.mean(squares[0] * squares[1] * squares[2]))
+        squares = np.einsum("nak,nak->na", self._basis, self._basis)
+        return float(np.mean(squares[:, 0] * squares[:, 1] * squares[:, 2]))
 
     def apply(self, control: Floats) -> Floats:
         """Return the values (N, c) of the net ``control`` (n_1, n_2, n_3, c) at the points."""

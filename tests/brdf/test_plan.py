@@ -1,6 +1,7 @@
 """What is decided before a fit: chart, encoding, knots, sizes, and the step in which a net is stored."""
 
 import functools
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -16,7 +17,7 @@ from bvbedit.brdf.materials import material_named
 from bvbedit.brdf.measured import MeasuredBrdf
 from bvbedit.brdf.plan import KNOT_GRID, SMALLEST_ERROR, UNSURE, Plan, balance_of, checked_placement, plan, try_charts
 from bvbedit.brdf.problem import tabulate
-from bvbedit.brdf.samples import draw_samples
+from bvbedit.brdf.samples import Samples, draw_samples
 from bvbedit.brdf.spline_brdf import face_spread
 from bvbedit.spline.knots import checked_knots
 from tests.brdf.measurements import measured
@@ -150,51 +151,58 @@ def test_freed_knots_leave_less_along_each_axis():
     assert any(not np.array_equal(a, b) for a, b in zip(freed.knots(size), made.knots(size), strict=True))
 
 
+@functools.cache
+def _judges(seed: int = 3) -> Samples:
+    return draw_samples(Glossy(0.25), HALF_DIFF, 8000, seed=seed)
+
+
 @pytest.mark.parametrize("precision", ["float16", "float32", "float64"])
 def test_float_nets_are_stored_as_they_are_called(precision):
-    storage = _made().storage(precision, np.array([0.1, 0.2]))
+    storage = _made().storage(precision, _made().lofted((8, 8, 5)), _judges())
     assert (storage.precision, storage.step) == (precision, None)
 
 
+@pytest.mark.parametrize("points", [150, 1000, 4000])
 @pytest.mark.parametrize(
     ("material", "chart", "encoding"),
-    [("satin-paint", HALF_DIFF, Root()), ("copper", HALF_DIFF, Log()), ("grey-felt", IN_OUT, Root())],
-    ids=["satin", "copper", "felt"],
+    [
+        ("satin-paint", HALF_DIFF, Root()),
+        ("copper", HALF_DIFF, Log()),
+        ("grey-felt", IN_OUT, Root()),
+        ("chrome", HALF_DIFF, Root()),
+    ],
+    ids=["satin", "copper", "felt", "chrome"],
 )
-def test_quantising_adds_about_four_percent_to_the_error(material, chart, encoding):
+def test_quantising_adds_four_percent_to_the_error(material, chart, encoding, points):
+    """The geometric mean over both sets, over pairs other than those by which the step was chosen.
+
+    In nets of some dozen control points each one's own rounding shows.
+    """
     brdf = material_named(material).brdf
-    samples = draw_samples(brdf, chart, 8000, seed=3)
-    (trial,) = try_charts(brdf, [chart], [encoding], LOG_COSINE, degrees=(3, 3, 3), points=1000)
-    made = plan(
-        tabulate(brdf, chart, chart.trial_grid),
-        encoding,
-        LOG_COSINE,
-        trial.balance,
-        degrees=(3, 3, 3),
-        placement="dominant",
-        points=1000,
-    )
-    spline = made.lofted(made.walk(1000)[-1])
-    errors = samples.errors_of(spline, encoding, LOG_COSINE)
-    storage = made.storage("quantised", errors)
-    stored = samples.errors_of(spline.with_control(storage.rounded(spline.control)), encoding, LOG_COSINE)
-    growth = np.sqrt(np.dot(trial.balance, stored**2) / np.dot(trial.balance, errors**2)) - 1
-    assert 0 < growth < 0.08
+    made = _plan(brdf, chart, encoding, chart.trial_grid, points=points)
+    spline = made.lofted(made.walk(points)[-1])
+    storage = made.storage("quantised", spline, draw_samples(brdf, chart, 20_000, seed=3))
+    others = draw_samples(brdf, chart, 20_000, seed=4)
+    exact = others.errors_of(spline, encoding, LOG_COSINE)
+    stored = others.errors_of(spline.with_control(storage.rounded(spline.control)), encoding, LOG_COSINE)
+    assert np.sqrt(np.prod(stored / exact)) - 1 == pytest.approx(0.04, abs=0.02 if points > 150 else 0.06)
 
 
 def test_a_better_model_is_stored_in_smaller_steps():
     made = _made()
-    steps = [made.storage("quantised", e * np.ones(2)).step for e in (1e-3, 2e-3, 4e-3)]
-    np.testing.assert_allclose(steps[1:], 2 * np.array(steps[:-1]), rtol=1e-12)
+    steps = [made.storage("quantised", made.lofted(made.walk(n)[-1]), _judges()).step for n in (100, 400, 1600)]
+    assert steps == sorted(steps, reverse=True)
 
 
-@pytest.mark.parametrize("errors", [0.0, 1e-300, 1e300])
-def test_steps_stay_within_reason_whatever_the_errors(errors):
-    made = _made()
-    largest = np.abs(made.problem.values).max()
-    with np.errstate(over="ignore"):
-        step = made.storage("quantised", np.full(2, errors)).step
-    assert largest * 2.0**-21 < step < largest / 8
+@pytest.mark.parametrize("value", [0.0, 1e-300, 1e5])
+def test_steps_stay_within_reason_whatever_the_errors(value):
+    made, samples = _made(), _judges()
+    spline = made.lofted((8, 8, 5))
+    met = replace(samples, reflectance=Root().decode(spline.evaluate(samples.parameters)))
+    off = replace(samples, reflectance=np.full_like(samples.reflectance, value))
+    largest = np.abs(spline.control).max()
+    for judges in (met, off):
+        assert largest * 2.0**-21 < made.storage("quantised", spline, judges).step < largest / 8
 
 
 @pytest.mark.parametrize("material", ["chrome", "blue-plastic"])
@@ -233,7 +241,7 @@ def test_trials_come_in_order_and_the_other_encodings_only_where_they_are_surely
 
 
 def test_a_trial_says_what_a_quick_fit_of_that_size_reaches():
-    """A trial's errors are those that a plan for the same problem comes to over other samples, to a tenth."""
+    """A trial's score is that which a plan for the balanced problem comes to over other samples, but for a factor 2."""
     brdf = Glossy(0.25)
     (trial,) = try_charts(brdf, [HALF_DIFF], [Root()], LOG_COSINE, degrees=(3, 3, 3), points=600)
     made = plan(
@@ -247,7 +255,7 @@ def test_a_trial_says_what_a_quick_fit_of_that_size_reaches():
     )
     samples = draw_samples(brdf, HALF_DIFF, 20_000, seed=9)
     found = samples.errors_of(made.lofted(made.walk(600)[-1]), Root(), LOG_COSINE)
-    np.testing.assert_allclose(trial.errors, found, rtol=0.1)
+    assert 0.5 < trial.score / np.sqrt(np.prod(found)) < 2
 
 
 errors = st.floats(1e-300, 1e300)

@@ -5,7 +5,7 @@ import functools
 import numpy as np
 import pytest
 
-from bvbedit.brdf import problem
+from bvbedit import threads
 from bvbedit.brdf.analytic import Lambert
 from bvbedit.brdf.base import Brdf
 from bvbedit.brdf.charts import HALF_DIFF, IN_OUT, RUSINKIEWICZ, RUSINKIEWICZ_360, Chart, grid_points
@@ -13,7 +13,7 @@ from bvbedit.brdf.encodings import Linear, Log, Root
 from bvbedit.brdf.geometry import elevation
 from bvbedit.brdf.losses import LOSSES, SMALLEST_SHARE
 from bvbedit.brdf.measured import MeasuredBrdf
-from bvbedit.brdf.problem import BEYOND, HELD, Table, pose, tabulate
+from bvbedit.brdf.problem import BEYOND, HELD, Table, charts_for, pose, tabulate
 from bvbedit.brdf.sample_sets import node_blocks
 from tests.brdf.samples import Glossy
 from tests.spline.refusals import refusal
@@ -64,6 +64,16 @@ class Blind(Brdf):
         return f, (wi[:, 2] < 0.7) | (wi[:, 0] * wo[:, 1] - wi[:, 1] * wo[:, 0] > 1e-9)
 
 
+class Twisted(Brdf):
+    """Reciprocal, but another one when light and viewer are mirrored; blind where the difference is large."""
+
+    reciprocal = True
+
+    def _evaluate(self, wi, wo):
+        twist = (wi[:, 0] * wo[:, 1] - wi[:, 1] * wo[:, 0]) * (wi[:, 2] - wo[:, 2])
+        return (0.5 + 0.4 * twist)[:, None] * np.array([1.0, 0.5, 2.0]), twist < 0.2
+
+
 def _nodes(chart: Chart, axes: tuple[np.ndarray, ...] = SMALL) -> tuple[np.ndarray, np.ndarray]:
     return chart.to_directions(grid_points(axes))
 
@@ -102,6 +112,29 @@ def test_a_reciprocal_material_is_looked_up_at_mirror_images_alone():
     np.testing.assert_array_equal(table.shares, 0.5)
 
 
+def test_a_reciprocal_material_that_tells_sides_apart_is_looked_up_on_one_side_of_the_in_out_chart():
+    """The other side is the exchanged pair's; on a grid whose elevations differ both are looked up."""
+    for axes in (SMALL, (SMALL[0], SMALL[0], SMALL[2])):
+        table = tabulate(Twisted(), IN_OUT, axes)
+        wi, wo = _nodes(IN_OUT, axes)
+        assert len(table.sides) == 2
+        above = _off_horizon(wi, wo)
+        for side, trusted, mirror in zip(table.sides, table.trusted, (1.0, MIRROR), strict=True):
+            f, backed = Twisted().evaluate_trusted(wi * mirror, wo * mirror)
+            np.testing.assert_allclose(side.reshape(-1, 3)[above], f[above], rtol=1e-12)
+            np.testing.assert_array_equal(trusted.reshape(-1)[above], backed[above])
+        assert not np.allclose(table.sides[0], table.sides[1])
+
+
+def test_charts_are_those_whose_grids_carry_the_size():
+    charts = (IN_OUT, HALF_DIFF)
+    assert charts_for(Glossy(), charts, (20, 20, 20)) == charts
+    assert charts_for(Glossy(), charts, (20, 20, 80)) == (IN_OUT,)
+    table = MeasuredBrdf(np.ones((9, 9, 9, 3)), np.ones((9, 9, 9), bool), (np.linspace(0, 1, 9),) * 3, HALF_DIFF)
+    assert charts_for(table, charts, (20, 20, 20)) == (IN_OUT,)
+    assert "9 x 9 x 9 in half-diff" in refusal(lambda: charts_for(table, charts, (20, 20, 400)))
+
+
 @each_chart
 def test_only_the_pair_itself_is_looked_up_on_request(chart):
     table = tabulate(Skewed(), chart, SMALL, mirrored=False)
@@ -112,8 +145,8 @@ def test_only_the_pair_itself_is_looked_up_on_request(chart):
 @each_chart
 def test_layers_may_be_looked_up_in_any_number_at_once(chart, monkeypatch):
     tables = []
-    for layers in (1, 5, 12, 1000):
-        monkeypatch.setattr(problem, "LAYERS", layers)
+    for rows in (1, 300, 5000, 1 << 20):
+        monkeypatch.setattr(threads, "ROWS", rows)
         tables.append(tabulate(Blind(), chart, SMALL))
     for other in tables[1:]:
         for name in ("sides", "trusted", "cosines"):
@@ -280,6 +313,17 @@ def test_a_balance_of_another_scale_is_the_same_balance(loss, factor):
     one, other = (pose(table, Root(), loss, b) for b in ((0.2, 1.0), (0.2 * factor, factor)))
     np.testing.assert_allclose(other.weights, factor * one.weights, rtol=1e-12)
     np.testing.assert_allclose(other.values, one.values, rtol=1e-12)
+
+
+@each_chart
+def test_the_weights_of_another_metric_may_stand_in(chart):
+    own, lent, log_cosine = (
+        pose(_table(chart), Root(), LOSSES[loss], (1.0, 0.5), surrogate=LOSSES[surrogate])
+        for loss, surrogate in (("fores", "fores"), ("fores", "log_cosine_rms"), ("log_cosine_rms", "log_cosine_rms"))
+    )
+    np.testing.assert_array_equal(lent.weights, log_cosine.weights)
+    assert not np.allclose(lent.weights, own.weights)
+    assert lent.loss.name == "fores"
 
 
 @each_chart

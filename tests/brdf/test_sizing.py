@@ -15,7 +15,17 @@ from bvbedit.brdf.losses import LOSSES
 from bvbedit.brdf.plan import Plan, plan
 from bvbedit.brdf.problem import tabulate
 from bvbedit.brdf.samples import Samples, draw_samples
-from bvbedit.brdf.sizing import AS_GOOD, WORTH_DOUBLING, Step, error_curve, knee, points_for, step_of, sufficient
+from bvbedit.brdf.sizing import (
+    AS_GOOD,
+    UNSEEN,
+    WORTH_DOUBLING,
+    Step,
+    error_curve,
+    knee,
+    points_for,
+    step_of,
+    sufficient,
+)
 from tests.brdf.samples import Glossy
 
 LOG_COSINE = LOSSES["log_cosine_rms"]
@@ -53,9 +63,15 @@ def test_the_knee_is_where_the_error_stops_falling(at):
 
 @given(share=st.floats(0.0, 0.9), length=st.integers(2, 10))
 def test_a_curve_that_falls_evenly_is_worth_all_or_nothing(share, length):
-    curve = _curve(_falling(length, share))
+    curve = _curve(_falling(length, share, 1e6))
     if abs(share - WORTH_DOUBLING) > 1e-6:
         assert knee(curve) is curve[-1 if share > WORTH_DOUBLING else 0]
+
+
+def test_errors_that_nobody_sees_are_worth_no_control_points():
+    curve = _curve(_falling(14, 0.6, 1.0), apart=1.0)
+    assert knee(curve).grid <= UNSEEN < curve[curve.index(knee(curve)) - 1].grid
+    assert sufficient(curve) is curve[-1]
 
 
 def test_a_late_fall_after_a_flat_stretch_is_worth_it():

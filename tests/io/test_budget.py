@@ -44,7 +44,7 @@ def _quick(size: tuple[int, ...], precision: str) -> SplineBrdf:
     """Return the quick fit of a size, stored as the plan has it."""
     made, samples = _planned()
     spline = made.lofted(size)
-    storage = made.storage(precision, samples.errors_of(spline, Root(), LOG_COSINE))
+    storage = made.storage(precision, spline, samples)
     return SplineBrdf(spline, HALF_DIFF, Root(), storage=storage)
 
 
