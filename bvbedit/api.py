@@ -23,7 +23,7 @@ from bvbedit.brdf.spline_brdf import SplineBrdf
 from bvbedit.brdf.storage import PRECISIONS, storage_named
 from bvbedit.errors import BvbError
 from bvbedit.io import load, save
-from bvbedit.io.budget import file_bytes, first_guess, kept_within, payload_bytes, size_within
+from bvbedit.io.budget import file_bytes, first_guess, kept_within, payload_bytes, reserved, size_within
 from bvbedit.render import render
 from bvbedit.spline.arguments import is_real_within, is_whole, shown
 
@@ -171,7 +171,7 @@ def fit(
             kept = kept_within(model, budget, count, lambda stored: _measured(stored, brdf, start))
             if kept is not None:
                 return kept
-            size = _smaller(made, size, budget / count(model), budget)
+            size = _smaller(made, size, (budget - reserved(count)) / count(model), budget)
     if size is not None:
         model = _settled(brdf, made, size, wish, samples, progress)
         return _measured(told(model, error_curve(made, samples, points)), brdf, start)
@@ -275,7 +275,7 @@ def _kept(gain: float) -> str:
 
 def _smaller(made: Plan, size: Sequence[int], share: float, budget: int) -> tuple[int, ...]:
     """Return a net of about ``share`` of the control points of ``size``. Raises BvbError where there is none."""
-    smaller = made.walk(int(np.prod(size) * 0.98 * share))[-1]
+    smaller = made.walk(int(np.prod(size) * 0.98 * min(share, 1.0)))[-1]
     if np.prod(smaller) >= np.prod(size):
         raise BvbError(f"{budget} bytes hold no net of degrees {made.degrees} and its report. Allow more.")
     return smaller

@@ -15,7 +15,7 @@ from bvbedit.brdf.geometry import Floats
 from bvbedit.brdf.losses import loss_named
 from bvbedit.brdf.plan import Plan, checked_degrees, checked_placement, checked_size, plan, try_charts
 from bvbedit.brdf.polish import polish
-from bvbedit.brdf.problem import Problem, Table, Weights, pose, tabulate
+from bvbedit.brdf.problem import Problem, Table, Weights, pose, secants, tabulate
 from bvbedit.brdf.samples import draw_samples, samples_for
 from bvbedit.brdf.spline_brdf import SplineBrdf, check_fitting_chart, keep_faces
 from bvbedit.errors import BvbError
@@ -201,7 +201,7 @@ def _settle_over(
     first = loft(problem.values, axes, knots, degrees, [x.roots**2 for x in lines])
     result = fit_weighted(
         problem.values,
-        problem.weights,
+        problem.weights * secants(problem, first.spline),
         axes,
         knots,
         degrees,

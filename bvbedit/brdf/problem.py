@@ -18,6 +18,7 @@ from bvbedit.brdf.measured import MeasuredBrdf, hold
 from bvbedit.brdf.sample_sets import HIGHEST_ELEVATION, HORIZON_MARGIN, LARGEST_REFLECTANCE, densities, draw
 from bvbedit.errors import BvbError
 from bvbedit.spline.arguments import real_array, shown
+from bvbedit.spline.tensor import TensorSpline
 from bvbedit.threads import each_block
 
 Weights = Callable[[Floats], Floats]
@@ -31,6 +32,8 @@ INSIDE = 0.5
 # 1e-3 models of 48 KiB reached 1e5 /sr there, E_avg rose to 476, and lobes grew spikes at grazing; with 0.1 it is 0.002
 # ... 0.17. More costs the metric: with 1 gold paint has 1.35 times the error, as a mean of `grid` and `nodes`.
 BEYOND = 0.1
+# A secant counts up to so many times the square of the tangent.
+LARGEST_SECANT = 1e4
 # The same at nodes without data, their value held from the nearest node with data.
 HELD = 0.1
 
@@ -287,6 +290,30 @@ def _squared_slopes(table: Table, encoding: Encoding, loss: Loss, values: Floats
     each_block(shape[0], rows, fill)
     # Where all channels are black their slope may be zero: the model is to be black there too.
     return np.maximum(squared, 1e-9 * squared.max()) if squared.any() else np.ones(shape)
+
+
+def secants(problem: Problem, spline: TensorSpline) -> Floats:
+    """Return by what the weights (m_0, m_1, m_2) should grow where a first fit is far off: one, or more.
+
+    The weights are squares of the metric's slope at the data. Where that vanishes, as at the foot of a highlight, an
+    error of the encoded value seems to cost nothing, but one that is large does: there the secant is what counts.
+    """
+    shape = problem.weights.shape
+    fitted = spline.evaluate_grid(problem.table.axes)
+    out = np.empty(shape)
+
+    def fill(part: slice) -> None:
+        y, off = problem.values[part], fitted[part] - problem.values[part]
+        cosines = [c[part] for c in problem.table.cosines]
+        loss, encoding = problem.surrogate, problem.encoding
+        f = encoding.decode(y)
+        moved = loss.transform(encoding.decode(fitted[part]), *cosines) - loss.transform(f, *cosines)
+        tangent = loss.slope(f, *cosines) * encoding.slope(y)
+        first, real = np.sum((tangent * off) ** 2, axis=-1), np.sum(moved**2, axis=-1)
+        out[part] = np.clip(np.divide(real, first, out=np.ones_like(real), where=first > 0), 1.0, LARGEST_SECANT)
+
+    each_block(shape[0], shape[1] * shape[2], fill)
+    return out
 
 
 def checked_weights(weights: Weights, points: Floats) -> Floats:

@@ -28,7 +28,7 @@ LEAST_BITS, MOST_BITS = 0.6, 1.1
 # What a report adds to a file, as long as it is not written: the quick fits that estimate a size have none.
 REPORT_BYTES = 1100
 # Of that, what is measured of the stored model.
-MEASURED_BYTES = 500
+MEASURED_BYTES = 400
 
 Bytes = Callable[[SplineBrdf], int]
 
@@ -95,6 +95,11 @@ def size_within(made: Plan, samples: Samples, budget: int, precision: str, count
     return found
 
 
+def reserved(count: Bytes) -> int:
+    """Return how many bytes are kept for what is measured of a stored model."""
+    return MEASURED_BYTES if count is file_bytes else 0
+
+
 def kept_within(
     model: SplineBrdf, budget: int, count: Bytes, measured: Callable[[SplineBrdf], SplineBrdf] | None = None
 ) -> SplineBrdf | None:
@@ -104,7 +109,7 @@ def kept_within(
     """
     if measured is None:
         return _stored_within(model, budget, count)
-    allowance = budget - (MEASURED_BYTES if count is file_bytes else 0)
+    allowance = budget - reserved(count)
     for _ in range(TRIES):
         stored = _stored_within(model, allowance, count)
         if stored is None:

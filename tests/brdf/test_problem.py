@@ -13,8 +13,10 @@ from bvbedit.brdf.encodings import Linear, Log, Root
 from bvbedit.brdf.geometry import elevation
 from bvbedit.brdf.losses import LOSSES, SMALLEST_SHARE
 from bvbedit.brdf.measured import MeasuredBrdf
-from bvbedit.brdf.problem import BEYOND, HELD, Table, charts_for, pose, tabulate
+from bvbedit.brdf.problem import BEYOND, HELD, LARGEST_SECANT, Table, charts_for, pose, secants, tabulate
 from bvbedit.brdf.sample_sets import node_blocks
+from bvbedit.spline.fitting import loft
+from bvbedit.spline.knots import place_knots
 from tests.brdf.samples import Glossy
 from tests.spline.refusals import refusal
 
@@ -324,6 +326,26 @@ def test_the_weights_of_another_metric_may_stand_in(chart):
     np.testing.assert_array_equal(lent.weights, log_cosine.weights)
     assert not np.allclose(lent.weights, own.weights)
     assert lent.loss.name == "fores"
+
+
+@each_chart
+def test_weights_grow_where_a_first_fit_is_so_far_off_that_the_tangent_does_not_tell(chart):
+    """Weight times squared deviation is then the square of what the metric sees, to first order or beyond it."""
+    problem = pose(_table(chart), Root(), LOSSES["log_cosine_rms"], (1.0, 1.0))
+    knots = [place_knots("averaged", u, 5, 3) for u in problem.table.axes]
+    spline = loft(problem.values, problem.table.axes, knots, (3, 3, 3)).spline
+    grown = secants(problem, spline)
+    assert grown.min() == 1.0
+    fitted = spline.evaluate_grid(problem.table.axes)
+    t = [problem.loss.transform(Root().decode(y), *problem.table.cosines) for y in (fitted, problem.values)]
+    f = Root().decode(problem.values)
+    slope = problem.loss.slope(f, *problem.table.cosines) * Root().slope(problem.values)
+    seen = np.sum((t[0] - t[1]) ** 2, axis=-1)
+    told = np.sum((slope * (fitted - problem.values)) ** 2, axis=-1) * grown
+    np.testing.assert_array_less(seen, told * (1 + 1e-9) + 1e-30)
+    far = (grown > 1) & (grown < LARGEST_SECANT)
+    assert far.any()
+    np.testing.assert_allclose(told[far], seen[far], rtol=1e-9)
 
 
 @each_chart
