@@ -1,13 +1,17 @@
 """What every BRDF can do: be evaluated, and say where its values can be believed."""
 
 from abc import ABC, abstractmethod
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from bvbedit.brdf.density import Density
 from bvbedit.brdf.geometry import Bools, Floats, unit_directions
 from bvbedit.errors import BvbError
+from bvbedit.spline.arguments import real_array, shown
 
+NORMAL = np.array([0.0, 0.0, 1.0])
 # Pairs evaluated at once. Large enough to keep every thread busy, small enough that the temporaries of a
 # million-pixel picture stay within tens of megabytes.
 BLOCK = 1 << 18
@@ -51,6 +55,63 @@ class Brdf(ABC):
         shape = wi.shape[:-1]
         f, trusted = self.evaluate_unit(wi.reshape(-1, 3), wo.reshape(-1, 3))
         return f.reshape(*shape, 3), trusted.reshape(shape)
+
+    @cached_property
+    def density(self) -> Density:
+        """What directions of light are drawn by: near f cos theta_i, and never zero where that is not."""
+        from bvbedit.brdf.sampling import half_vector_density
+
+        return half_vector_density(self)
+
+    def sample(self, wo: ArrayLike, u: ArrayLike) -> tuple[Floats, Floats, Floats]:
+        """Return directions of light wi (..., 3) drawn for ``wo`` (..., 3), their density (...), and weights (..., 3).
+
+        ``u`` (..., 2) are numbers in [0, 1), broadcast against ``wo``. The density is over solid angle, in 1/sr; the
+        weight is f cos theta_i over it, so that its mean over many u is the albedo. Where a sample is rejected, as half
+        vectors may lead below the horizon, and where ``wo`` is there, wi = n and density and weight are zero.
+        Raises BvbError as ``evaluate`` does, and for u outside [0, 1).
+        """
+        wo, numbers = unit_directions(wo, "wo"), real_array(u, "u")
+        if numbers.ndim == 0 or numbers.shape[-1] != 2 or not ((numbers >= 0) & (numbers < 1)).all():
+            raise BvbError(f"u is {shown(u)}. Give numbers (..., 2) in [0, 1).")
+        try:
+            shape = np.broadcast_shapes(wo.shape[:-1], numbers.shape[:-1])
+        except ValueError:
+            raise BvbError(f"wo {wo.shape} and u {numbers.shape} do not broadcast. Give compatible shapes.") from None
+        view = np.ascontiguousarray(np.broadcast_to(wo, (*shape, 3)).reshape(-1, 3))
+        wi, density, weight = self.sample_unit(view, np.broadcast_to(numbers, (*shape, 2)).reshape(-1, 2))
+        return wi.reshape(*shape, 3), density.reshape(shape), weight.reshape(*shape, 3)
+
+    def sample_unit(self, wo: Floats, u: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return ``sample`` for arrays (n, 3) and (n, 2) that are known to be right; nothing is checked."""
+        above = wo[:, 2] >= 0
+        wi, density = self.density.sample(np.where(above[:, None], wo, NORMAL), np.ascontiguousarray(u))
+        kept = above & (density > 0)
+        wi[~kept], density[~kept] = NORMAL, 0.0
+        weight = np.zeros((len(wo), 3))
+        f = self.evaluate_unit(wi[kept], wo[kept])[0]
+        weight[kept] = f * (wi[kept, 2] / density[kept])[:, None]
+        return wi, density, weight
+
+    def pdf(self, wi: ArrayLike, wo: ArrayLike) -> Floats:
+        """Return the density (...) over solid angle with which ``sample`` draws ``wi`` (..., 3), given ``wo`` (..., 3).
+
+        Zero where either lies below the horizon. Raises BvbError as ``evaluate`` does.
+        """
+        wi, wo = unit_directions(wi, "wi"), unit_directions(wo, "wo")
+        try:
+            wi, wo = np.broadcast_arrays(wi, wo)
+        except ValueError:
+            raise BvbError(f"wi {wi.shape} and wo {wo.shape} do not broadcast. Give them compatible shapes.") from None
+        shape = wi.shape[:-1]
+        return self.pdf_unit(wi.reshape(-1, 3), wo.reshape(-1, 3)).reshape(shape)
+
+    def pdf_unit(self, wi: Floats, wo: Floats) -> Floats:
+        """Return ``pdf`` for arrays (n, 3) that are known to hold unit vectors; nothing is checked."""
+        above = (wi[:, 2] > 0) & (wo[:, 2] >= 0)
+        out = np.zeros(len(wi))
+        out[above] = self.density.pdf(np.ascontiguousarray(wi[above]), np.ascontiguousarray(wo[above]))
+        return out
 
     def evaluate_unit(self, wi: Floats, wo: Floats) -> tuple[Floats, Bools]:
         """Return ``evaluate_trusted`` for arrays (n, 3) that are known to hold unit vectors; nothing is checked."""

@@ -8,6 +8,7 @@ from numbers import Real
 import numpy as np
 
 from bvbedit.brdf.base import Brdf
+from bvbedit.brdf.density import Density
 from bvbedit.brdf.geometry import Bools, Floats
 from bvbedit.errors import BvbError
 from bvbedit.spline.arguments import is_real_within, shown
@@ -22,6 +23,10 @@ COS_FLOOR = 1e-6
 # Roughness (alpha, Beckmann's m) is the root mean square slope, up to a factor: 1e-4 makes a lobe twenty times narrower
 # than the disc of the sun, 2 a surface of slopes beyond 60 degrees.
 ROUGHNESS = (1e-4, 2.0)
+
+
+# Share of the samples of a model with a lobe and a diffuse part that is drawn by the cosine.
+DIFFUSE_SHARE = 0.3
 
 
 class Pair:
@@ -90,6 +95,11 @@ class Analytic(Brdf):
     """A BRDF in closed form. A subclass implements ``reflectance`` on pairs whose angles all parts of a sum share."""
 
     reciprocal = True
+
+    @property
+    @abstractmethod
+    def density(self) -> Density:
+        """The density of the model's own lobes."""
 
     @abstractmethod
     def reflectance(self, pair: Pair) -> Floats:

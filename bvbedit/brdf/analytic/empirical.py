@@ -7,7 +7,9 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from bvbedit.brdf.analytic.common import ROUGHNESS, Analytic, Colour, Pair, colour, number
+from bvbedit.brdf.analytic.common import DIFFUSE_SHARE, ROUGHNESS, Analytic, Colour, Pair, colour, number
+from bvbedit.brdf.analytic.densities import Beckmann, Cosine, CosinePower, Mixture
+from bvbedit.brdf.density import Density
 from bvbedit.brdf.geometry import Floats
 from bvbedit.errors import BvbError
 from bvbedit.spline.arguments import shown
@@ -24,6 +26,10 @@ class Lambert(Analytic):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "albedo", colour("Lambert", "albedo", self.albedo, 0.0, 1.0))
+
+    @property
+    def density(self) -> Density:
+        return Cosine()
 
     def reflectance(self, pair: Pair) -> Floats:
         return np.tile(np.asarray(self.albedo) / np.pi, (len(pair), 1))
@@ -83,6 +89,13 @@ class Lafortune(Analytic):
         object.__setattr__(self, "lobes", lobes)
         object.__setattr__(self, "diffuse", colour("Lafortune", "diffuse", self.diffuse, 0.0, 1.0))
 
+    @property
+    def density(self) -> Density:
+        channels = [np.stack([lobe.c_xy, lobe.c_z, lobe.n], axis=-1) for lobe in self.lobes]
+        # Channels with the same lobe share it.
+        lobes = sorted({(float(c_xy), float(c_z), float(n)) for rows in channels for c_xy, c_z, n in rows})
+        return Mixture([Cosine(), *(CosinePower(*lobe) for lobe in lobes)])
+
     def reflectance(self, pair: Pair) -> Floats:
         f = np.tile(np.asarray(self.diffuse) / np.pi, (len(pair), 1))
         vertical = pair.cos_i * pair.cos_o
@@ -118,6 +131,10 @@ class Ward(Analytic):
         if self.normalisation not in get_args(Normalisation):
             choices = ", ".join(get_args(Normalisation))
             raise BvbError(f"Ward: normalisation is {shown(self.normalisation)}. Choose one of {choices}.")
+
+    @property
+    def density(self) -> Density:
+        return Mixture([Cosine(), Beckmann(self.alpha)], [DIFFUSE_SHARE, 1 - DIFFUSE_SHARE])
 
     def reflectance(self, pair: Pair) -> Floats:
         a2 = self.alpha**2

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bvbedit.brdf.analytic.common import Analytic, Colour, Pair, colour, number
+from bvbedit.brdf.analytic.densities import Mixture
 from bvbedit.brdf.analytic.microfacet import GGX
+from bvbedit.brdf.density import Density
 from bvbedit.brdf.geometry import Floats
 from bvbedit.errors import BvbError
 from bvbedit.spline.arguments import shown
@@ -34,6 +36,11 @@ class Sum(Analytic):
         object.__setattr__(
             self, "weights", tuple(colour("Sum", f"weights[{i}]", w, 0.0, 1000.0) for i, w in enumerate(weights))
         )
+
+    @property
+    def density(self) -> Density:
+        used = [part.density for part, w in zip(self.parts, self.weights or (), strict=True) if np.any(w)]
+        return Mixture(used or [part.density for part in self.parts])
 
     def reflectance(self, pair: Pair) -> Floats:
         f = np.zeros((len(pair), 3))
@@ -66,6 +73,10 @@ class Coated(Analytic):
             raise BvbError(f"Coated: coat is {shown(self.coat)}. Give a GGX.")
         object.__setattr__(self, "cover", number("Coated", "cover", self.cover, 0.0, 1.0))
         object.__setattr__(self, "bend", number("Coated", "bend", self.bend, 1.0, 3.0))
+
+    @property
+    def density(self) -> Density:
+        return Mixture([self.base.density, self.coat.density])
 
     def reflectance(self, pair: Pair) -> Floats:
         passed_in = 1 - self.cover * self.coat.fresnel(pair.cos_i)

@@ -4,8 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bvbedit.brdf.analytic.common import ROUGHNESS, Analytic, Colour, Pair, colour, number
+from bvbedit.brdf.analytic.common import DIFFUSE_SHARE, ROUGHNESS, Analytic, Colour, Pair, colour, number
+from bvbedit.brdf.analytic.densities import Beckmann, Cosine, Mixture, VisibleGGX
 from bvbedit.brdf.analytic.fresnel import Fresnel, checked_fresnel
+from bvbedit.brdf.density import Density
 from bvbedit.brdf.geometry import Floats
 
 
@@ -30,6 +32,10 @@ class CookTorrance(Analytic):
         object.__setattr__(self, "specular", colour("CookTorrance", "specular", self.specular, 0.0, 1.0))
         object.__setattr__(self, "diffuse", colour("CookTorrance", "diffuse", self.diffuse, 0.0, 1.0))
         checked_fresnel("CookTorrance", self.fresnel)
+
+    @property
+    def density(self) -> Density:
+        return Mixture([Cosine(), Beckmann(self.m)], [DIFFUSE_SHARE, 1 - DIFFUSE_SHARE])
 
     def reflectance(self, pair: Pair) -> Floats:
         m2 = self.m**2
@@ -60,6 +66,10 @@ class GGX(Analytic):
     def __post_init__(self) -> None:
         object.__setattr__(self, "alpha", number("GGX", "alpha", self.alpha, *ROUGHNESS))
         checked_fresnel("GGX", self.fresnel)
+
+    @property
+    def density(self) -> Density:
+        return VisibleGGX(self.alpha)
 
     def reflectance(self, pair: Pair) -> Floats:
         a2 = self.alpha**2
