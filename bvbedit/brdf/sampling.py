@@ -15,6 +15,7 @@ import numpy as np
 from bvbedit.brdf.charts import HALF_DIFF
 from bvbedit.brdf.density import Density
 from bvbedit.brdf.geometry import Floats, spherical
+from bvbedit.errors import BvbError
 from bvbedit.spline.tensor import TensorSpline
 
 if TYPE_CHECKING:
@@ -84,7 +85,7 @@ def half_vector_density(brdf: "Brdf") -> HalfVectorDensity:
     """Return the density for ``brdf``: the mean over channels of f cos theta_i, as it falls on half vectors.
 
     A control point is the mean of what is to be approximated under its hat function: that is never negative, and the
-    integral is kept. Black materials are sampled evenly over half vectors.
+    integral is kept. Black materials are sampled evenly over half vectors. Raises BvbError for values not finite.
     """
     theta = np.linspace(0, np.pi / 2, ELEVATIONS)
     s, phi = _heights(brdf), np.linspace(0, np.pi, AZIMUTHS)
@@ -100,6 +101,8 @@ def half_vector_density(brdf: "Brdf") -> HalfVectorDensity:
     seen = (along > 0) & (wi[..., 2] > 0)
     value = np.zeros(along.shape)
     f = brdf.evaluate_unit(wi[seen], np.broadcast_to(wo[:, None, None], wi.shape)[seen])[0]
+    if not np.isfinite(f).all():
+        raise BvbError("The material gives values that are not finite. Check it.")
     value[seen] = f.mean(axis=1) * wi[seen][:, 2] * 4 * along[seen]
     # Sums of extreme reflectance leave the range of float64, and only its shape counts.
     largest = value.max(axis=(1, 2), keepdims=True)

@@ -119,7 +119,7 @@ def _pictures(out: Path, truth: Any, measured: Any, models: dict[str, Any]) -> d
     pictures = {}
     for name, brdf in {"truth": truth, "measured": measured, **models}.items():
         _tell(f"Rendering {name}")
-        pictures[name] = api.render(brdf, "sphere", **PICTURE)
+        pictures[name] = api.render(brdf, "sphere", density=truth.density, **PICTURE)
         write_exr(out / f"{name}.exr", pictures[name])
     toned = {name: tone_map(p) for name, p in pictures.items()}
     shown = {"measured": "measurement, with noise", **{name: label for name, (label, _) in FITS.items()}}

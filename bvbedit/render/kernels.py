@@ -1,7 +1,7 @@
 """The wavefront: from pixels to the pairs of directions at which the material is asked. Compiled; nothing is checked.
 
-Paths that end without the material (the sky, the ground) are summed here. A path that meets the sphere stops there and
-leaves what the material must be multiplied by, so that any Brdf can be evaluated in bulk.
+Paths that end without the material (the sky, the ground) are summed here. A path that meets the sphere stops there, so
+that any Brdf can be asked in bulk where it goes on, and is taken up again from the directions that were drawn.
 """
 
 import math
@@ -59,8 +59,14 @@ def ground_radiance(
     return red * ground[1], green * ground[2], blue * ground[3]
 
 
+@kernel
+def below_horizon(sun: Array, ground: Array) -> bool:
+    """Return whether the ground shades all from the sun."""
+    return len(ground) > 0 and sun[2] < 0
+
+
 @parallel_kernel
-def trace(
+def see(
     first: int,
     first_sample: int,
     shape: tuple[int, int],
@@ -71,19 +77,21 @@ def trace(
     sun: Array,
     texels: Array,
     direct: Array,
-    wi: Array,
+    seen: Array,
+    normal: Array,
     wo: Array,
-    light: Array,
-    lit: Array,
+    numbers: Array,
+    sunlit: Array,
+    to_sun: Array,
 ) -> None:
-    """Trace every sample of a run of pixels.
+    """Send every camera ray of a run of pixels.
 
     ``first`` is the first pixel's number in the picture of ``shape`` (h, w). ``camera`` (4, 3): position, then right,
     up and forward, where right and up reach the middle of the right and the upper edge. ``sphere``: centre, radius.
     ``ground``: height, albedo, or empty. ``sun``: direction, irradiance, or empty. ``texels`` (h, w, 3). Writes, per
-    pixel: ``direct`` (n, 3), the sum over samples that need no material; and per sample and light (n, s, k): ``lit``,
-    whether light arrives; there ``wi``, ``wo`` in the sphere's frame, and ``light``, by which f_r is multiplied:
-    radiance times cosine over density (elsewhere zero). Light 0 is the surroundings, light 1 the sun.
+    pixel: ``direct`` (n, 3), the sum over samples that need no material; and per sample (n, s): ``seen``, whether it
+    meets the sphere; there its ``normal``, ``wo`` in the sphere's frame, ``numbers`` (n, s, 2) to draw a direction by,
+    ``sunlit``, and where that is true the direction ``to_sun`` in that frame.
     """
     height, width = shape
     cx, cy, cz, radius = sphere
@@ -91,11 +99,7 @@ def trace(
         state = mix(seed, np.uint64(first + pixel))
         row, column = divmod(first + pixel, width)
         red = green = blue = 0.0
-        for s in range(lit.shape[1]):
-            for k in range(lit.shape[2]):
-                lit[pixel, s, k] = False
-                light[pixel, s, k, 0] = light[pixel, s, k, 1] = light[pixel, s, k, 2] = 0.0
-
+        for s in range(seen.shape[1]):
             # A ray through a random place in the pixel.
             u, v = point(state, first_sample + s, PIXEL)
             a, b = 2.0 * (column + u) / width - 1.0, 1.0 - 2.0 * (row + v) / height
@@ -108,6 +112,7 @@ def trace(
             # What it meets first.
             t = sphere_distance(camera[0, 0], camera[0, 1], camera[0, 2], dx, dy, dz, cx, cy, cz, radius)
             u, v = point(state, first_sample + s, SKY)
+            seen[pixel, s], sunlit[pixel, s] = t != NEVER, False
             if t == NEVER:
                 if len(ground) and dz < 0:
                     t = (ground[0] - camera[0, 2]) / dz
@@ -119,41 +124,61 @@ def trace(
                 continue
 
             # The frame on the sphere: tangent (tx, ty, 0), bitangent n x t, normal n.
-            x, y, z = camera[0, 0] + t * dx, camera[0, 1] + t * dy, camera[0, 2] + t * dz
-            nx, ny, nz = (x - cx) / radius, (y - cy) / radius, (z - cz) / radius
+            nx = (camera[0, 0] + t * dx - cx) / radius
+            ny = (camera[0, 1] + t * dy - cy) / radius
+            nz = (camera[0, 2] + t * dz - cz) / radius
             tx, ty = tangent(nx, ny)
             bx, by, bz = -nz * ty, nz * tx, nx * ty - ny * tx
-            ox, oy, oz = -(dx * tx + dy * ty), -(dx * bx + dy * by + dz * bz), -(dx * nx + dy * ny + dz * nz)
+            normal[pixel, s, 0], normal[pixel, s, 1], normal[pixel, s, 2] = nx, ny, nz
+            wo[pixel, s, 0], wo[pixel, s, 1] = -(dx * tx + dy * ty), -(dx * bx + dy * by + dz * bz)
+            # Rounding must not put the viewer of a grazed sphere below its horizon.
+            wo[pixel, s, 2] = max(0.0, -(dx * nx + dy * ny + dz * nz))
+            numbers[pixel, s, 0], numbers[pixel, s, 1] = u, v
 
-            # Light from the surroundings: the sky, or the ground below the horizon.
-            lx, ly, lz = cosine_direction(u, v)
-            ex, ey, ez = lx * tx + ly * bx + lz * nx, lx * ty + ly * by + lz * ny, ly * bz + lz * nz
-            if len(ground) and ez < 0:
-                t = (ground[0] - z) / ez
-                u, v = point(state, first_sample + s, BOUNCE)
-                r, g, b = ground_radiance(x + t * ex, y + t * ey, u, v, sphere, ground, sun, texels)
-            else:
-                r, g, b = look_up(texels, ex, ey, ez)
-            if r > 0 or g > 0 or b > 0:
-                lit[pixel, s, 0] = True
-                wi[pixel, s, 0, 0], wi[pixel, s, 0, 1], wi[pixel, s, 0, 2] = lx, ly, lz
-                wo[pixel, s, 0, 0], wo[pixel, s, 0, 1], wo[pixel, s, 0, 2] = ox, oy, oz
-                light[pixel, s, 0, 0], light[pixel, s, 0, 1], light[pixel, s, 0, 2] = (
-                    r * math.pi,
-                    g * math.pi,
-                    b * math.pi,
-                )
-
-            # Light from the sun. A sphere does not shade the side that faces the sun; the ground shades all from below.
-            if len(sun) and not (len(ground) and sun[2] < 0):
+            # A sphere does not shade the side that faces the sun.
+            if len(sun) and not below_horizon(sun, ground):
                 cosine = sun[0] * nx + sun[1] * ny + sun[2] * nz
                 if cosine > 0:
-                    lit[pixel, s, 1] = True
-                    wi[pixel, s, 1, 0] = sun[0] * tx + sun[1] * ty
-                    wi[pixel, s, 1, 1] = sun[0] * bx + sun[1] * by + sun[2] * bz
-                    wi[pixel, s, 1, 2] = cosine
-                    wo[pixel, s, 1, 0], wo[pixel, s, 1, 1], wo[pixel, s, 1, 2] = ox, oy, oz
-                    light[pixel, s, 1, 0] = sun[3] * cosine
-                    light[pixel, s, 1, 1] = sun[4] * cosine
-                    light[pixel, s, 1, 2] = sun[5] * cosine
+                    sunlit[pixel, s] = True
+                    to_sun[pixel, s, 0] = sun[0] * tx + sun[1] * ty
+                    to_sun[pixel, s, 1] = sun[0] * bx + sun[1] * by + sun[2] * bz
+                    to_sun[pixel, s, 2] = cosine
         direct[pixel, 0], direct[pixel, 1], direct[pixel, 2] = red, green, blue
+
+
+@parallel_kernel
+def arrive(
+    first: int,
+    first_sample: int,
+    samples: int,
+    seed: np.uint64,
+    sphere: Ball,
+    ground: Array,
+    sun: Array,
+    texels: Array,
+    asked: Array,
+    normal: Array,
+    wi: Array,
+    radiance: Array,
+) -> None:
+    """Write the ``radiance`` (m, 3) that arrives at the sphere from the drawn directions ``wi`` (m, 3), in its frame.
+
+    ``asked`` (m,) are the numbers of the samples, ``samples`` for each pixel, whose normals are ``normal`` (m, 3): the
+    sky, or below the horizon the ground, of whose light one sample is taken.
+    """
+    cx, cy, cz, radius = sphere
+    for m in prange(len(asked)):
+        nx, ny, nz = normal[m, 0], normal[m, 1], normal[m, 2]
+        tx, ty = tangent(nx, ny)
+        bx, by, bz = -nz * ty, nz * tx, nx * ty - ny * tx
+        lx, ly, lz = wi[m, 0], wi[m, 1], wi[m, 2]
+        ex, ey, ez = lx * tx + ly * bx + lz * nx, lx * ty + ly * by + lz * ny, ly * bz + lz * nz
+        if len(ground) and ez < 0:
+            t = (ground[0] - (cz + radius * nz)) / ez
+            state = mix(seed, np.uint64(first + asked[m] // samples))
+            u, v = point(state, first_sample + asked[m] % samples, BOUNCE)
+            x, y = cx + radius * nx + t * ex, cy + radius * ny + t * ey
+            r, g, b = ground_radiance(x, y, u, v, sphere, ground, sun, texels)
+        else:
+            r, g, b = look_up(texels, ex, ey, ez)
+        radiance[m, 0], radiance[m, 1], radiance[m, 2] = r, g, b
