@@ -11,7 +11,7 @@ from bvbedit.brdf.charts import Chart
 from bvbedit.brdf.encodings import Encoding
 from bvbedit.brdf.geometry import Floats
 from bvbedit.brdf.losses import LogCosine, Loss
-from bvbedit.brdf.problem import Problem, Table, Weights, pose, tabulate
+from bvbedit.brdf.problem import Problem, Table, Weights, pose, secants, tabulate
 from bvbedit.brdf.sample_sets import draw
 from bvbedit.brdf.samples import Samples, in_chart, looked_up
 from bvbedit.brdf.spline_brdf import keep_faces
@@ -27,7 +27,7 @@ from bvbedit.spline.adaptive import (
     placed_knots,
 )
 from bvbedit.spline.arguments import is_whole, one_per_axis, shown
-from bvbedit.spline.fitting import loft
+from bvbedit.spline.fitting import fit_weighted, loft
 from bvbedit.spline.free_knots import move_knots
 from bvbedit.spline.knots import PLACEMENTS, checked_degree
 from bvbedit.spline.tensor import TensorSpline
@@ -52,6 +52,8 @@ CORRECTIONS = 2
 FEATURE = 2.0
 # Pairs of each set that judge a trial.
 TRIAL_SAMPLES = 20_000
+# Conjugate gradient steps of a trial.
+TRIAL_STEPS = 6
 # What a trial's error is uncertain by: another encoding has to be that much better than the first.
 UNSURE = 0.1
 # An error below this share of the other set's counts as so large.
@@ -182,11 +184,23 @@ class _Bench:
             posed = problem
             if balance != problem.balance:
                 posed = pose(problem.table, problem.encoding, problem.loss, balance, self.weights, problem.surrogate)
-            rows = marginals(posed.weights)
-            spline = loft(posed.values, problem.table.axes, self.knots, self.made.degrees, rows).spline
-            kept = spline.with_control(keep_faces(spline.control, problem.chart))
-            errors = self.samples.errors_of(kept, problem.encoding, problem.loss)
+            errors = self.samples.errors_of(self._fitted(posed), problem.encoding, problem.loss)
         return Trial(problem.chart, problem.encoding, problem.surrogate, balance, errors)
+
+    def _fitted(self, posed: Problem) -> TensorSpline:
+        """Return a fit in few steps: lofting alone makes small nets of sharp highlights ring, and misjudges them."""
+        axes, degrees = posed.table.axes, self.made.degrees
+        first = loft(posed.values, axes, self.knots, degrees, marginals(posed.weights)).spline
+        return fit_weighted(
+            posed.values,
+            posed.weights * secants(posed, first),
+            axes,
+            self.knots,
+            degrees,
+            start=first.control,
+            project=lambda control: keep_faces(control, posed.chart),
+            max_iterations=TRIAL_STEPS,
+        ).spline
 
 
 def plan(
@@ -275,23 +289,31 @@ def try_charts(
     """
     reflectance = looked_up(brdf, draw(brdf, TRIAL_SAMPLES))
 
-    def tried_out(
-        table: Table, samples: Samples, encoding: Encoding, surrogate: Loss = SURROGATE
-    ) -> tuple[Trial, _Bench]:
-        black = balance_of(samples.errors(np.zeros_like(samples.reflectance), loss))
+    def bench(
+        table: Table, samples: Samples, encoding: Encoding, surrogate: Loss, balance: tuple[float, float]
+    ) -> _Bench:
         made = plan(
             table,
             encoding,
             loss,
-            black,
+            balance,
             degrees=degrees,
             placement="dominant",
             points=points,
             weights=weights,
             surrogate=surrogate,
         )
-        bench = _Bench(made, made.knots(made.walk(points)[-1]), samples, weights)
-        return bench.trial(black, 1), bench
+        return _Bench(made, made.knots(made.walk(points)[-1]), samples, weights)
+
+    def tried_out(
+        table: Table, samples: Samples, encoding: Encoding, surrogate: Loss = SURROGATE
+    ) -> tuple[Trial, _Bench]:
+        # Knots for sets that count as if the model were black say little: a first fit tells better.
+        balance = balance_of(samples.errors(np.zeros_like(samples.reflectance), loss))
+        first = bench(table, samples, encoding, surrogate, balance).trial(balance, 0)
+        balance = balance_of(first.errors)
+        second = bench(table, samples, encoding, surrogate, balance)
+        return second.trial(balance, 0), second
 
     def in_its_way(chart: Chart) -> tuple[Trial, _Bench]:
         table = tabulate(brdf, chart, chart.trial_grid)
