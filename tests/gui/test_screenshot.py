@@ -83,7 +83,7 @@ class Child:
         (subprocess.TimeoutExpired("python", 60), "longer than 60 s"),
         (OSError("no processes left"), "no processes left"),
     ],
-    ids=str,
+    ids=["fault", "signal", "picture", "status", "time", "processes"],
 )
 def test_without_opengl_it_says_what_to_install(outcome, words, model, monkeypatch, tmp_path):
     def run(*_arguments: object, **_options: object) -> Child:
