@@ -47,11 +47,7 @@ class Brdf(ABC):
 
         False are invalid cells of a measurement, elevations beyond ``reliable_elevation``, and below the horizon.
         """
-        wi, wo = unit_directions(wi, "wi"), unit_directions(wo, "wo")
-        try:
-            wi, wo = np.broadcast_arrays(wi, wo)
-        except ValueError:
-            raise BvbError(f"wi {wi.shape} and wo {wo.shape} do not broadcast. Give them compatible shapes.") from None
+        wi, wo = _pairs(wi, wo)
         shape = wi.shape[:-1]
         f, trusted = self.evaluate_unit(wi.reshape(-1, 3), wo.reshape(-1, 3))
         return f.reshape(*shape, 3), trusted.reshape(shape)
@@ -98,11 +94,7 @@ class Brdf(ABC):
 
         Zero where either lies below the horizon. Raises BvbError as ``evaluate`` does.
         """
-        wi, wo = unit_directions(wi, "wi"), unit_directions(wo, "wo")
-        try:
-            wi, wo = np.broadcast_arrays(wi, wo)
-        except ValueError:
-            raise BvbError(f"wi {wi.shape} and wo {wo.shape} do not broadcast. Give them compatible shapes.") from None
+        wi, wo = _pairs(wi, wo)
         shape = wi.shape[:-1]
         return self.pdf_unit(wi.reshape(-1, 3), wo.reshape(-1, 3)).reshape(shape)
 
@@ -130,6 +122,16 @@ class Brdf(ABC):
                 f[block][above], backed = self._evaluate(i[above], o[above])
                 trusted[block][above] = backed & (smaller[above] >= lowest)
         return f, trusted
+
+
+def _pairs(wi: ArrayLike, wo: ArrayLike) -> tuple[Floats, Floats]:
+    """Return both as unit vectors (..., 3) of one shape. Raises BvbError where they are none, or do not broadcast."""
+    i, o = unit_directions(wi, "wi"), unit_directions(wo, "wo")
+    try:
+        i, o = np.broadcast_arrays(i, o)
+    except ValueError:
+        raise BvbError(f"wi {i.shape} and wo {o.shape} do not broadcast. Give them compatible shapes.") from None
+    return i, o
 
 
 def check_brdf(value: object, name: str) -> None:
