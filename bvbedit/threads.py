@@ -4,7 +4,7 @@ A few layers at once stay in the cache, and their temporaries need no fresh memo
 more than the arithmetic.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
@@ -21,6 +21,24 @@ def side_by_side(work: Callable[[S], T], items: Iterable[S]) -> list[T]:
 
     with ThreadPoolExecutor(numba.get_num_threads()) as pool:
         return list(pool.map(work, items))
+
+
+def in_turn(work: Callable[[S], T], items: Iterable[S]) -> Iterator[T]:
+    """Yield what ``work`` returns for each of the ``items``, in their order, while others are worked on.
+
+    Each is done by one thread: kernels inside do not spread over others. What was not begun when the iterator is closed
+    is left undone.
+    """
+    import numba
+
+    def alone() -> None:
+        numba.set_num_threads(1)
+
+    pool = ThreadPoolExecutor(numba.get_num_threads(), initializer=alone)
+    try:
+        yield from pool.map(work, items)
+    finally:
+        pool.shutdown(cancel_futures=True)
 
 
 def each_block(count: int, rows: int, work: Callable[[slice], T]) -> list[T]:

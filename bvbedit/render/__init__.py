@@ -4,9 +4,9 @@ import sys
 from types import ModuleType
 from typing import Any
 
-from bvbedit.render.integrator import render
+from bvbedit.render.integrator import render, render_passes
 
-__all__ = ["render"]
+__all__ = ["render", "render_passes"]
 
 
 class _Room(ModuleType):
