@@ -2,7 +2,9 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from os import PathLike
 from time import perf_counter
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,11 +13,12 @@ from bvbedit.brdf.blend import blend
 from bvbedit.brdf.charts import FITTING_CHARTS, Chart, chart_named
 from bvbedit.brdf.encodings import Encoding, encoding_named
 from bvbedit.brdf.fit import AUTO, THOROUGH_ROUNDS, fit_net, is_published, settle
+from bvbedit.brdf.geometry import Floats
 from bvbedit.brdf.losses import Loss, loss_named
 from bvbedit.brdf.metrics import Comparison, compare, estimate
 from bvbedit.brdf.noise import estimate_noise
 from bvbedit.brdf.plan import Plan, checked_degrees, checked_placement, checked_size, plan, try_charts
-from bvbedit.brdf.problem import Weights, charts_for, tabulate
+from bvbedit.brdf.problem import Weights, charts_for, on_any_chart, tabulate
 from bvbedit.brdf.samples import Samples, draw_samples
 from bvbedit.brdf.sizing import Step, error_curve, knee, points_for, sufficient
 from bvbedit.brdf.soundness import soundness
@@ -26,6 +29,9 @@ from bvbedit.io import load, save
 from bvbedit.io.budget import file_bytes, first_guess, kept_within, payload_bytes, reserved, size_within
 from bvbedit.render import render
 from bvbedit.spline.arguments import is_real_within, is_whole, shown
+
+if TYPE_CHECKING:
+    from bvbedit.render.scene import Scene
 
 __all__ = ["Comparison", "blend", "compare", "fit", "load", "render", "save"]
 
@@ -72,7 +78,8 @@ def fit(
     max_payload: int | None = None,
     tolerance: float | None = None,
     metric: str = "log_cosine_rms",
-    weights: Weights | None = None,
+    weights: Callable[[Floats], Floats] | None = None,
+    scene: "str | PathLike[str] | Scene | None" = None,
     precision: str = AUTO,
     thorough: bool = False,
     smoothing: float | str | None = None,
@@ -90,7 +97,8 @@ def fit(
     exclude each other. With none of them the net is as large as the knee of the error curve asks for.
 
     ``metric`` names what is to be small: ``log_cosine_rms``, ``fores`` or ``relative_l1``. ``weights``, a function of
-    chart parameters (n, 3) that returns (n,) >= 0, multiplies the weights that follow from it. ``precision``:
+    chart parameters (n, 3) that returns (n,) >= 0, multiplies the weights that follow from it. ``scene``, as ``render``
+    has it, replaces them: what counts is what that scene shows of the material, on an 8-bit screen. ``precision``:
     ``quantised`` (``auto``, but ``float32`` in the paper's configuration; it adds 4 % to the error), ``float16``,
     ``float32`` or ``float64``.
     ``smoothing`` penalises differences of the net, for noisy data: a strength, or ``auto`` for the one that generalised
@@ -112,7 +120,14 @@ def fit(
     check_brdf(brdf, "brdf")
     if sum(x is not None for x in (size, max_bytes, max_payload, tolerance)) > 1:
         raise BvbError("size, max_bytes, max_payload and tolerance exclude each other. Give one of them.")
-    wish = _checked(chart, encoding, degrees, knots, metric, weights, precision, thorough, smoothing, source)
+    wanted = on_any_chart(weights)
+    wish = _checked(chart, encoding, degrees, knots, metric, wanted, precision, thorough, smoothing, source)
+    if scene is not None:
+        if weights is not None:
+            raise BvbError("weights and scene exclude each other. Give one of them.")
+        from bvbedit.render.footprint import scene_weights
+
+        wish = replace(wish, weights=scene_weights(brdf, scene, wish.loss))
     for name, bound in (("max_bytes", max_bytes), ("max_payload", max_payload)):
         if bound is not None and (not is_whole(bound) or not 1 <= bound <= LARGEST_BUDGET):
             raise BvbError(f"{name} is {shown(bound)}. Give a whole number of bytes from 1 to {LARGEST_BUDGET:,}.")
@@ -137,10 +152,10 @@ def fit(
     else:
         points = LARGEST_KNEE // 8
     trials = try_charts(
-        brdf, wish.charts, wish.encodings, wish.loss, degrees=wish.degrees, points=points, weights=weights
+        brdf, wish.charts, wish.encodings, wish.loss, degrees=wish.degrees, points=points, weights=wish.weights
     )
     best = trials[0]
-    samples = draw_samples(brdf, best.chart, JUDGES, JUDGING_SEED, weights)
+    samples = draw_samples(brdf, best.chart, JUDGES, JUDGING_SEED, wish.weights)
     largest = max(size) ** 3 if size is not None else points if budget is not None else LARGEST_NET
     made = plan(
         tabulate(brdf, best.chart),
@@ -150,7 +165,7 @@ def fit(
         degrees=wish.degrees,
         placement=wish.knots,
         points=largest,
-        weights=weights,
+        weights=wish.weights,
         surrogate=best.surrogate,
     )
     # What the chart averages out of what is fitted is still in the data that nets are judged by.
@@ -205,8 +220,6 @@ def _checked(
         raise BvbError(f"Chart {chart!r} is for tables only. Fit in one of {', '.join((AUTO, *FITTING_CHARTS))}.")
     if precision not in (AUTO, *PRECISIONS):
         raise BvbError(f"Unknown precision {shown(precision)}. Choose one of {', '.join((AUTO, *PRECISIONS))}.")
-    if weights is not None and not callable(weights):
-        raise BvbError(f"weights is {shown(weights)}. Give a function of chart parameters (n, 3).")
     if smoothing is not None and not _is_auto(smoothing) and not is_real_within(smoothing, 0.0, 1e15):
         raise BvbError(f"smoothing is {shown(smoothing)}. Give a strength in 0 ... 1e15, or {AUTO!r}.")
     encodings = tuple(encoding_named(name) for name in (ENCODINGS if _is_auto(encoding) else (encoding,)))

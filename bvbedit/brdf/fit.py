@@ -15,7 +15,7 @@ from bvbedit.brdf.geometry import Floats
 from bvbedit.brdf.losses import loss_named
 from bvbedit.brdf.plan import Plan, checked_degrees, checked_placement, checked_size, plan, try_charts
 from bvbedit.brdf.polish import polish
-from bvbedit.brdf.problem import Problem, Table, Weights, pose, secants, tabulate
+from bvbedit.brdf.problem import Problem, Table, Weights, on_any_chart, pose, secants, tabulate
 from bvbedit.brdf.samples import draw_samples, samples_for
 from bvbedit.brdf.spline_brdf import SplineBrdf, check_fitting_chart, keep_faces
 from bvbedit.errors import BvbError
@@ -49,7 +49,7 @@ def fit_net(
     degrees: Sequence[int] = (3, 3, 3),
     knots: str = "dominant",
     metric: str = "log_cosine_rms",
-    weights: Weights | None = None,
+    weights: Callable[[Floats], Floats] | None = None,
     progress: Progress | None = None,
 ) -> SplineBrdf:
     """Return the B-spline volume of ``size`` control points that approximates ``brdf``, with a report.
@@ -69,8 +69,8 @@ def fit_net(
     start = perf_counter()
     if is_published(chart, encoding, knots):
         return _published(brdf, encoding, size, degrees).told(seconds=perf_counter() - start)
-    points = math.prod(size)
-    (trial,) = try_charts(brdf, [chart], [encoding], loss, degrees=degrees, points=points, weights=weights)
+    points, wanted = math.prod(size), on_any_chart(weights)
+    (trial,) = try_charts(brdf, [chart], [encoding], loss, degrees=degrees, points=points, weights=wanted)
     made = plan(
         tabulate(brdf, chart),
         encoding,
@@ -79,14 +79,12 @@ def fit_net(
         degrees=degrees,
         placement=knots,
         points=max(size) ** 3,
-        weights=weights,
+        weights=wanted,
         surrogate=trial.surrogate,
     )
     if knots == "free":
         made = made.freed(size)
-    return settle(brdf, made, size, weights=weights, progress=progress).told(
-        knots=knots, seconds=perf_counter() - start
-    )
+    return settle(brdf, made, size, weights=wanted, progress=progress).told(knots=knots, seconds=perf_counter() - start)
 
 
 def is_published(chart: Chart, encoding: Encoding, knots: str) -> bool:

@@ -21,7 +21,8 @@ from bvbedit.spline.arguments import real_array, shown
 from bvbedit.spline.tensor import TensorSpline
 from bvbedit.threads import each_block
 
-Weights = Callable[[Floats], Floats]
+# What an error counts at parameters (n, 3) of a chart: (n,).
+Weights = Callable[[Chart, Floats], Floats]
 
 MIRROR = np.array([1.0, -1.0, 1.0])
 # Variances below this share of the square of the value are rounding.
@@ -218,7 +219,7 @@ def pose(
 ) -> Problem:
     """Return the least-squares problem for a table.
 
-    ``balance``: what an error over each of the sets counts. ``weights`` (n, 3) -> (n,) multiplies the weights built in,
+    ``balance``: what an error over each of the sets counts. ``weights`` multiplies the weights built in,
     which are those of the metric ``surrogate``, or of ``loss`` itself.
     Raises BvbError where these are not finite, negative, all zero, or of another shape.
     """
@@ -258,7 +259,7 @@ def pose(
     density = np.where(known, density, HELD * mean)
     if weights is not None:
         total = density.sum()
-        density = density * checked_weights(weights, grid_points(table.axes)).reshape(shape)
+        density = density * checked_weights(weights, table.chart, grid_points(table.axes)).reshape(shape)
         if not density.any():
             raise BvbError("weights are zero at all nodes. Return numbers above zero where the model is to be good.")
         density = density * (total / density.sum())
@@ -316,11 +317,18 @@ def secants(problem: Problem, spline: TensorSpline) -> Floats:
     return out
 
 
-def checked_weights(weights: Weights, points: Floats) -> Floats:
-    """Return ``weights(points)`` (n,), the largest as 1. Raises BvbError where they are no finite numbers >= 0."""
+def on_any_chart(weights: Callable[[Floats], Floats] | None) -> Weights | None:
+    """Return a function of chart parameters (n, 3) as weights. Raises BvbError where it is none."""
+    if weights is None:
+        return None
     if not callable(weights):
         raise BvbError(f"weights is {shown(weights)}. Give a function of chart parameters (n, 3).")
-    found = real_array(weights(points), "Weights")
+    return lambda _chart, points: weights(points)
+
+
+def checked_weights(weights: Weights, chart: Chart, points: Floats) -> Floats:
+    """Return weights (n,) at ``points``, the largest as 1. Raises BvbError where they are no finite numbers >= 0."""
+    found = real_array(weights(chart, points), "Weights")
     if found.shape != (len(points),) or not np.isfinite(found).all() or (found < 0).any():
         raise BvbError(
             f"weights returned {shown(found)} for {len(points):,} points. "

@@ -94,7 +94,7 @@ def in_chart(reflectance: Reflectance, chart: Chart, weights: Weights | None = N
     """Return pairs and reflectance as samples in ``chart``. Raises BvbError for weights that are none."""
     pairs = reflectance.pairs
     parameters = chart.to_parameters(pairs.wi, pairs.wo)
-    given = np.ones(len(parameters)) if weights is None else checked_weights(weights, parameters)
+    given = np.ones(len(parameters)) if weights is None else checked_weights(weights, chart, parameters)
     cosines = pairs.wi[:, 2:], pairs.wo[:, 2:]
     return Samples(parameters, reflectance.f, cosines, pairs.parts(), given[:, None])
 

@@ -44,6 +44,8 @@ def fit(
     max_payload: int | None = None,
     tolerance: float | None = None,
     metric: str = "log_cosine_rms",
+    scene: str | None = None,
+    image_tolerance: float | None = None,
     precision: str = "auto",
     thorough: bool = False,
     smoothing: Smoothing = None,
@@ -79,6 +81,10 @@ def fit(
         Largest metric, in place of a size: the smallest net that keeps it on both sets of samples.
     metric
         log_cosine_rms, fores or relative_l1: what is to be small.
+    scene
+        Only what this scene (a name, a .toml or an .exr) shows of the material counts, in place of the metric.
+    image_tolerance
+        Largest error of a pixel in that scene, as a share of white, in place of a size: the smallest file for it.
     precision
         quantised, float16, float32 or float64 control points in the file; auto is quantised.
     thorough
@@ -90,34 +96,49 @@ def fit(
     as_json
         Print one JSON object.
     """
+    from functools import partial
     from time import perf_counter
 
     from bvbedit import api
+    from bvbedit.errors import BvbError
     from bvbedit.io import check_target
 
     start = perf_counter()
     check_target(target, (".bvb",))
     if explain is not None:
         check_target(explain, (".png", ".svg"))
+    if image_tolerance is not None and scene is None:
+        raise BvbError("--image-tolerance needs a --scene to look at. Name one.")
+    if image_tolerance is not None and any(x is not None for x in (size, max_bytes, max_payload, tolerance)):
+        raise BvbError("--image-tolerance and another bound or size exclude each other. Give one of them.")
     brdf = api.load(source)
+    chosen = partial(
+        api.fit,
+        brdf,
+        chart=chart,
+        encoding=encoding,
+        degrees=(degree,) * 3,
+        knots=knots,
+        metric=metric,
+        scene=scene,
+        precision=precision,
+        thorough=thorough,
+        smoothing=smoothing,
+        source=source.name,
+    )
     with progress(f"Fitting {source.name}") as watch:
-        model = api.fit(
-            brdf,
-            chart=chart,
-            encoding=encoding,
-            size=size,
-            degrees=(degree,) * 3,
-            knots=knots,
-            max_bytes=max_bytes,
-            max_payload=max_payload,
-            tolerance=tolerance,
-            metric=metric,
-            precision=precision,
-            thorough=thorough,
-            smoothing=smoothing,
-            source=source.name,
-            progress=watch,
-        )
+        if scene is not None and image_tolerance is not None:
+            from bvbedit.image_tolerance import fit_to_image
+
+            model = fit_to_image(
+                brdf,
+                scene,
+                image_tolerance,
+                fit_within=lambda most: chosen(max_bytes=most),
+                progress=watch,
+            )
+        else:
+            model = chosen(size=size, max_bytes=max_bytes, max_payload=max_payload, tolerance=tolerance, progress=watch)
     api.save(model, target)
     if explain is not None:
         from bvbedit.cli.explanation import plot_curve
@@ -176,7 +197,7 @@ def describe_model(model: Any, file: Path) -> dict[str, Any]:
         "face_spread": face_spread(spline.control, model.chart),
         **{k: told.get(k) for k in ("source", "knots", "condition", "seconds", "notes", "metrics")},
         "soundness": told["soundness"] if "soundness" in told else soundness_of(model),
-        **{k: told[k] for k in ("noise", "smoothing", "tried", "curve") if k in told},
+        **{k: told[k] for k in ("image", "noise", "smoothing", "tried", "curve") if k in told},
     }
 
 

@@ -11,14 +11,19 @@ def render(
     /,
     *files: Path,
     scene: str = "sphere",
+    row: bool = False,
+    difference: bool = False,
+    swatches: bool = False,
     width: int = 256,
     height: int = 256,
     spp: int = 64,
+    noise: float | None = None,
+    time_limit: float | None = None,
     seed: int = 0,
     exposure: float = 0.0,
     as_json: Json = False,
 ) -> None:
-    """Render models or measurements, side by side, to a picture.
+    """Render models or measurements to a picture. Ctrl-C keeps what there is of it.
 
     Parameters
     ----------
@@ -27,15 +32,25 @@ def render(
     files
         More files to render, and last the picture to write: .png (tone-mapped) or .exr (linear).
     scene
-        A scene by name, or a lat-long .exr environment for the sphere.
+        A scene by name (sphere, studio, furnace), a .toml scene, or a lat-long .exr environment for the sphere.
+    row
+        Each file in a picture of its own, side by side; also without asking where the scene shows one model.
+    difference
+        The first file beside each other one, with the differences amplified, from the same random numbers (.png).
+    swatches
+        A sheet of small pictures with names, some to a row (.png).
     width
         Width of each picture in pixels.
     height
         Height in pixels.
     spp
-        Samples per pixel.
+        Samples per pixel, at most.
+    noise
+        Stop when the standard error is this share of the picture's mean.
+    time_limit
+        Seconds for each picture after which no more samples are begun.
     seed
-        Chooses the random numbers: the same for all materials, so that pictures differ only where these do.
+        Chooses the random numbers: the same for all materials.
     exposure
         Stops: each doubles the brightness of a .png.
     as_json
@@ -43,38 +58,31 @@ def render(
     """
     from time import perf_counter
 
-    import numpy as np
-
     from bvbedit import api
+    from bvbedit.cli import layouts
     from bvbedit.errors import BvbError
     from bvbedit.io import check_target
-    from bvbedit.io.exr import write_exr
-    from bvbedit.io.png import write_png
-    from bvbedit.render.tonemap import tone_map
 
     if not files:
         raise BvbError("Nothing to render to. Name the models first and the .png or .exr to write last.")
     *more, target = files
     models = [first, *more]
-    check_target(target, (".png", ".exr"))
+    chosen = [name for name, wanted in (("row", row), ("difference", difference), ("swatches", swatches)) if wanted]
+    if len(chosen) > 1:
+        raise BvbError(f"--{chosen[0]} and --{chosen[1]} exclude each other. Choose one.")
+    if difference and len(models) < 2:
+        raise BvbError("A difference needs two files at least. Name the reference first.")
+    check_target(target, (".png",) if difference or swatches else (".png", ".exr"))
     start = perf_counter()
-    pictures = []
-    for n, file in enumerate(models):
-        brdf = api.load(file)
-        with progress(f"Rendering {file.name} ({n + 1} of {len(models)})") as watch:
-            pictures.append(api.render(brdf, scene, width=width, height=height, spp=spp, seed=seed, progress=watch))
-    row = np.concatenate(pictures, axis=1)
-    if target.suffix.lower() == ".exr":
-        write_exr(target, row)
-    else:
-        write_png(target, tone_map(row, exposure))
+    options = {"width": width, "height": height, "spp": spp, "noise": noise, "time_limit": time_limit, "seed": seed}
+    shot = layouts.Shot([api.load(file) for file in models], [file.name for file in models], scene, options, exposure)
+    told = layouts.LAYOUTS[chosen[0] if chosen else "picture"](shot, target)
     report(
         {
             "file": str(target),
             "files": [str(m) for m in models],
-            "width": row.shape[1],
-            "height": row.shape[0],
-            "spp": spp,
+            "scene": scene,
+            **told,
             "seed": seed,
             "seconds": perf_counter() - start,
         },

@@ -112,7 +112,7 @@ def test_knots_gather_where_the_weights_are(side):
     u, v, _ = np.meshgrid(*SMALL, indexing="ij")
     f = 0.2 + np.exp(-(((u - 0.3) / 0.05) ** 2)) + np.exp(-(((u - 0.7) / 0.05) ** 2)) + 0.1 * v
     table = MeasuredBrdf(f[..., None] * np.ones(3), np.ones(f.shape, bool), SMALL, HALF_DIFF)
-    made = _plan(table, weights=lambda p: np.where((p[:, 0] > 0.5) == side, 1.0, 1e-6))
+    made = _plan(table, weights=lambda _chart, p: np.where((p[:, 0] > 0.5) == side, 1.0, 1e-6))
     (t, _, _) = made.knots((14, 5, 5))
     t = t[4:-4]
     inside = [np.count_nonzero(np.abs(t - at) < 0.2) for at in (0.3, 0.7)]

@@ -144,15 +144,15 @@ def test_weights_move_the_error_to_where_they_are_small():
         ]
         return float(np.sqrt(np.mean((t[0] - t[1])[where] ** 2)))
 
-    narrow = _weighted(lambda p: np.where(p[:, 0] < 0.3, 1.0, 1e-3))
-    wide = _weighted(lambda p: np.where(p[:, 0] < 0.3, 1e-3, 1.0))
+    narrow = _weighted(lambda _chart, p: np.where(p[:, 0] < 0.3, 1.0, 1e-3))
+    wide = _weighted(lambda _chart, p: np.where(p[:, 0] < 0.3, 1e-3, 1.0))
     assert rms(narrow, inside) < 0.9 * rms(wide, inside)
     assert rms(wide, ~inside) < 0.9 * rms(narrow, ~inside)
 
 
 @pytest.mark.parametrize("scale", [1e-6, 1e6])
 def test_weights_of_another_scale_are_the_same_weights(scale):
-    one, other = (_weighted(lambda p, s=s: s * (0.1 + p[:, 1])).control for s in (1.0, scale))
+    one, other = (_weighted(lambda _chart, p, s=s: s * (0.1 + p[:, 1])).control for s in (1.0, scale))
     np.testing.assert_allclose(other, one, rtol=0, atol=1e-9)
 
 

@@ -11,6 +11,7 @@ from bvbedit.brdf.charts import HALF_DIFF, IN_OUT, RUSINKIEWICZ, Chart
 from bvbedit.brdf.encodings import Root
 from bvbedit.brdf.losses import LOSSES
 from bvbedit.brdf.measured import MeasuredBrdf
+from bvbedit.brdf.problem import on_any_chart
 from bvbedit.brdf.sample_sets import LARGEST_REFLECTANCE, draw
 from bvbedit.brdf.samples import JUDGE, Samples, draw_samples, samples_for, split
 from bvbedit.spline.tensor import TensorSpline
@@ -143,7 +144,7 @@ def test_an_exact_model_has_no_error_and_a_shifted_one_the_errors_of_its_values(
 @each_chart
 @pytest.mark.parametrize("count", [7, 400, 1003])
 def test_splitting_loses_nothing_and_doubles_nothing(chart, count):
-    samples = draw_samples(Glossy(0.3), chart, count, weights=lambda p: p[:, 0] + 0.1)
+    samples = draw_samples(Glossy(0.3), chart, count, weights=lambda _chart, p: p[:, 0] + 0.1)
     fitted, judged = split(samples)
     total = len(samples.parameters)
     assert len(judged.parameters) == -(-total // JUDGE)
@@ -178,7 +179,7 @@ def test_weights_are_those_of_the_function():
     def weights(p: np.ndarray) -> np.ndarray:
         return p @ np.array([1.0, 2.0, 3.0])
 
-    samples = draw_samples(Glossy(), HALF_DIFF, 300, weights=weights)
+    samples = draw_samples(Glossy(), HALF_DIFF, 300, weights=on_any_chart(weights))
     given = weights(samples.parameters)
     np.testing.assert_allclose(samples.weights[:, 0], given / given.max(), rtol=1e-15)
     assert (draw_samples(Glossy(), HALF_DIFF, 300).weights == 1).all()
@@ -187,7 +188,7 @@ def test_weights_are_those_of_the_function():
 @each_loss
 def test_errors_count_by_their_weights(loss):
     """Weights that are whole numbers, the largest 3, are so many samples in one place."""
-    samples = draw_samples(Glossy(0.3), HALF_DIFF, 200, weights=lambda p: np.floor(4 * p[:, 1]))
+    samples = draw_samples(Glossy(0.3), HALF_DIFF, 200, weights=lambda _chart, p: np.floor(4 * p[:, 1]))
     times = np.rint(3 * samples.weights[:, 0]).astype(int)
     assert set(times) == {0, 1, 2, 3}
     f = samples.reflectance * np.random.default_rng(0).uniform(0.5, 1.5, samples.reflectance.shape)
@@ -221,7 +222,7 @@ def test_a_set_without_weight_is_spoken_for_by_the_other(loss):
     ids=["three a point", "one for all", "negative", "nan", "infinite"],
 )
 def test_weights_that_are_none_are_refused(wrong):
-    refusal(lambda: draw_samples(Glossy(), HALF_DIFF, 300, weights=wrong))
+    refusal(lambda: draw_samples(Glossy(), HALF_DIFF, 300, weights=on_any_chart(wrong)))
 
 
 def test_values_beyond_all_measure_are_capped():
