@@ -9,6 +9,10 @@ import numpy as np
 import pytest
 
 import bvbedit
+from bvbedit.cli import demo
+
+# What saves trying charts and encodings where they are not what is tested.
+SHARP = ("--chart", "half-diff", "--encoding", "root")
 
 
 def one_object(out):
@@ -63,11 +67,12 @@ def test_fit_without_options_chooses_and_tells_why(run, folder, tmp_path):
 
 
 def test_fit_keeps_a_file_bound_and_a_tolerance(run, folder, tmp_path):
-    told = one_object(run("fit", folder / "satin.binary", tmp_path / "m.bvb", "--max-bytes", 6000, "--json")[1])
+    fit = ("fit", folder / "small.npz")
+    told = one_object(run(*fit, tmp_path / "m.bvb", "--max-bytes", 6000, *SHARP, "--json")[1])
     assert told["file_bytes"] <= 6000
-    told = one_object(run("fit", folder / "satin.binary", tmp_path / "m.bvb", "--tolerance", 0.02, "--json")[1])
+    told = one_object(run(*fit, tmp_path / "m.bvb", "--tolerance", 0.02, *SHARP, "--json")[1])
     assert max(told["metrics"][s]["log_cosine_rms"] for s in ("grid", "nodes")) <= 0.021
-    status, out, err = run("fit", folder / "satin.binary", tmp_path / "n.bvb", "--tolerance", 1e-6)
+    status, out, err = run(*fit, tmp_path / "n.bvb", "--tolerance", 1e-6, *SHARP)
     assert (status, out, err.count("\n")) == (1, "", 1)
     assert "cannot be reached" in err
     assert not (tmp_path / "n.bvb").exists()
@@ -75,7 +80,7 @@ def test_fit_keeps_a_file_bound_and_a_tolerance(run, folder, tmp_path):
 
 @pytest.mark.parametrize("bound", [2700, 9000])
 def test_fit_keeps_a_payload_bound(run, folder, tmp_path, bound):
-    status, out, _ = run("fit", folder / "satin.binary", tmp_path / "m.bvb", "--max-payload", bound, "--json")
+    status, out, _ = run("fit", folder / "small.npz", tmp_path / "m.bvb", "--max-payload", bound, *SHARP, "--json")
     assert status == 0
     # No more is spent than the material has features for.
     assert one_object(out)["payload_bytes"] <= bound
@@ -84,7 +89,7 @@ def test_fit_keeps_a_payload_bound(run, folder, tmp_path, bound):
 @pytest.mark.parametrize("precision", ["float16", "float32", "float64"])
 def test_fit_stores_in_the_precision_asked_for(run, folder, tmp_path, precision):
     target = tmp_path / "m.bvb"
-    run("fit", folder / "satin.binary", target, "--size", "6,5,4", "--precision", precision)
+    run("fit", folder / "small.npz", target, "--size", "6,5,4", "--precision", precision, *SHARP)
     status, out, _ = run("info", target, "--json")
     told = one_object(out)
     assert status == 0
@@ -165,18 +170,18 @@ def test_sample_list_and_make(run, tmp_path):
 BAD = [
     (["fit", "{here}/missing.binary", "{out}/m.bvb"], "missing.binary"),
     (["fit", "{here}", "{out}/m.bvb"], "folder"),
-    (["fit", "{here}/satin.binary", "{out}/m.bvb", "--chart", "polar"], "polar"),
-    (["fit", "{here}/satin.binary", "{out}/m.bvb", "--chart", "rusinkiewicz"], "rusinkiewicz"),
-    (["fit", "{here}/satin.binary", "{out}/m.bvb", "--encoding", "cube"], "cube"),
-    (["fit", "{here}/satin.binary", "{out}/m.bvb", "--knots", "random"], "random"),
-    (["fit", "{here}/satin.binary", "{out}/m.bvb", "--size", "20,20,800"], "800"),
-    (["fit", "{here}/satin.binary", "{out}/m.bvb", "--size", "3,3,3"], "3"),
-    (["fit", "{here}/satin.binary", "{out}/m.bvb", "--degree", "17"], "17"),
-    (["fit", "{here}/satin.binary", "{out}/m.bvb", "--max-bytes", "10"], "10"),
-    (["fit", "{here}/satin.binary", "{out}/m.bvb", "--size", "8,8,8", "--max-bytes", "9999"], "exclude"),
-    (["fit", "{here}/satin.binary", "{out}/m.bvb", "--precision", "int8"], "int8"),
-    (["fit", "{here}/satin.binary", "{out}/no/such/folder/m.bvb"], "no/such/folder"),
-    (["fit", "{here}/satin.binary", "{out}/m.txt"], ".txt"),
+    (["fit", "{here}/small.npz", "{out}/m.bvb", "--chart", "polar"], "polar"),
+    (["fit", "{here}/small.npz", "{out}/m.bvb", "--chart", "rusinkiewicz"], "rusinkiewicz"),
+    (["fit", "{here}/small.npz", "{out}/m.bvb", "--encoding", "cube"], "cube"),
+    (["fit", "{here}/small.npz", "{out}/m.bvb", "--knots", "random"], "random"),
+    (["fit", "{here}/small.npz", "{out}/m.bvb", "--size", "20,20,800"], "800"),
+    (["fit", "{here}/small.npz", "{out}/m.bvb", "--size", "3,3,3", *SHARP], "3"),
+    (["fit", "{here}/small.npz", "{out}/m.bvb", "--degree", "17"], "17"),
+    (["fit", "{here}/small.npz", "{out}/m.bvb", "--max-bytes", "10", *SHARP], "10"),
+    (["fit", "{here}/small.npz", "{out}/m.bvb", "--size", "8,8,8", "--max-bytes", "9999"], "exclude"),
+    (["fit", "{here}/small.npz", "{out}/m.bvb", "--precision", "int8"], "int8"),
+    (["fit", "{here}/small.npz", "{out}/no/such/folder/m.bvb"], "no/such/folder"),
+    (["fit", "{here}/small.npz", "{out}/m.txt"], ".txt"),
     (["render", "{here}/satin.bvb", "{out}/p.jpg"], ".jpg"),
     (["render", "{here}/satin.bvb", "{out}/p.png", "--scene", "moon"], "moon"),
     (["render", "{here}/satin.bvb", "{out}/p.png", "--width", "0"], "0"),
@@ -230,7 +235,15 @@ def test_start_up_imports_neither_numba_nor_pyvista(folder):
         subprocess.run([sys.executable, "-c", code, *arguments], check=True, capture_output=True, timeout=60)
 
 
-def test_demo_does_the_whole_job(run, tmp_path):
+def test_demo_does_the_whole_job(run, tmp_path, monkeypatch):
+    """With small nets and pictures: the same steps in less time."""
+    label, options = demo.FITS["paper"]
+    small = {
+        "paper": (label, options | {"size": (8, 8, 12)}),
+        "adaptive": (demo.FITS["adaptive"][0], {"max_bytes": 4096}),
+    }
+    monkeypatch.setattr(demo, "FITS", small)
+    monkeypatch.setattr(demo, "PICTURE", {"width": 48, "height": 48, "spp": 4})
     out = tmp_path / "demo"
     status, printed, err = run("demo", "--out", out, "--json")
     assert err == ""  # no terminal, no progress

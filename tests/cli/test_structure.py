@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import bvbedit
-from bvbedit.brdf.analytic import Lambert
 from bvbedit.brdf.spline_brdf import face_spread
 from bvbedit.brdf.storage import Storage
 
@@ -21,11 +20,8 @@ EDITS = {
 
 
 @pytest.fixture
-def grey(tmp_path):
-    path = tmp_path / "grey.bvb"
-    model = bvbedit.fit(Lambert(0.5), chart="half-diff", encoding="root", size=(6, 5, 4), precision="float32")
-    bvbedit.save(model, path)
-    return path
+def grey(folder):
+    return folder / "grey.bvb"
 
 
 @pytest.mark.parametrize(("command", "arguments"), [(e[0], e[1:]) for e in EDITS.values()], ids=EDITS)
