@@ -9,8 +9,10 @@ from bvbedit import blend
 from bvbedit.brdf.analytic import Lambert
 from bvbedit.brdf.charts import HALF_DIFF, IN_OUT
 from bvbedit.brdf.encodings import Linear, Log, Root
-from bvbedit.brdf.fit import fit_net
-from bvbedit.brdf.spline_brdf import face_spread
+from bvbedit.brdf.losses import LOSSES
+from bvbedit.brdf.plan import plan
+from bvbedit.brdf.problem import tabulate
+from bvbedit.brdf.spline_brdf import SplineBrdf, face_spread
 from bvbedit.spline.knots import clamped
 from bvbedit.spline.tensor import TensorSpline
 from tests.brdf.samples import Glossy, random_pairs
@@ -21,10 +23,17 @@ SHINY = Glossy(0.3)
 
 
 @functools.cache
+def _model(brdf, chart, encoding, size, knots="averaged"):
+    """Return a quick fit: what is blended need not be the best model of its material."""
+    table = tabulate(brdf, chart, tuple(np.linspace(0, 1, n) for n in (31, 26, 19)))
+    made = plan(table, encoding, LOSSES["log_cosine_rms"], (1.0, 1.0), degrees=(3, 3, 3), placement=knots, points=1000)
+    return SplineBrdf(made.lofted(size), chart, encoding)
+
+
 def _two(encoding, chart=HALF_DIFF, other=None):
     return (
-        fit_net(MATT, chart, encoding, size=(10, 6, 4), knots="averaged"),
-        fit_net(SHINY, chart, other or encoding, size=(12, 7, 5), knots="uniform"),
+        _model(MATT, chart, encoding, (10, 6, 4)),
+        _model(SHINY, chart, other or encoding, (12, 7, 5), "uniform"),
     )
 
 
@@ -62,7 +71,7 @@ def test_other_encodings_are_refitted_and_the_report_tells_how_far(space, rng):
 
 
 def test_charts_that_differ_are_mixed_by_reflectance_in_the_first_ones(rng):
-    a, b = fit_net(MATT, HALF_DIFF, Root(), size=(12, 6, 4)), fit_net(SHINY, IN_OUT, Log(), size=(9, 9, 12))
+    a, b = _model(MATT, HALF_DIFF, Root(), (12, 6, 4)), _model(SHINY, IN_OUT, Log(), (9, 9, 12))
     mixed = blend(a, b, 0.3, "linear")
     assert mixed.chart is HALF_DIFF
     assert mixed.encoding == Root()
@@ -95,7 +104,7 @@ def test_what_cannot_be_mixed_as_nets_is_refused_by_naming_both():
     message = refusal(lambda: blend(root, log, 0.5))
     assert "half-diff, root (k = 3)" in message
     assert "half-diff, log (eps = 0.001)" in message
-    other = fit_net(SHINY, IN_OUT, Root(), size=(5, 5, 5))
+    other = _model(SHINY, IN_OUT, Root(), (5, 5, 5))
     assert "in-out" in refusal(lambda: blend(root, other, 0.5))
 
 
