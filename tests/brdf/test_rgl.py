@@ -1,5 +1,7 @@
 """Evaluation of RGL measurements: its warp against quadrature, and a generated measurement against its truth."""
 
+import functools
+
 import numpy as np
 import pytest
 
@@ -14,9 +16,14 @@ from tests.io.rgl_files import ggx_fields
 METAL = GGX(0.4, Schlick((0.9, 0.6, 0.3)))
 
 
+@functools.cache
+def small() -> dict[str, np.ndarray]:
+    return ggx_fields(METAL, 0.4, elevations=5, density=16, samples=8)
+
+
 def fields(**changes: object) -> dict[str, object]:
     """Return the arguments of a small sound measurement with some of them changed."""
-    f = ggx_fields(METAL, 0.4, elevations=5, density=16, samples=8)
+    f = small()
     sound = {"vndf": f["vndf"][0], "rgb": f["rgb"][0], "jacobian": True}
     return {k: f[k] for k in ("theta_i", "sigma", "ndf")} | sound | changes
 

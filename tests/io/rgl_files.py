@@ -80,7 +80,10 @@ def _points(density: Floats, v: Floats) -> tuple[Floats, Floats]:
     rows = np.array([np.interp(fine, nodes, row) for row in density])
     totals = np.interp(fine, nodes, np.trapezoid(rows, fine, axis=1))
     y = _inverse(totals, v, fine)
-    x = np.array([_inverse(np.array([np.interp(t, nodes, c) for c in rows.T]), v, fine) for t in y])
+    at = y * (len(density) - 1)
+    below = np.minimum(at.astype(int), len(density) - 2)
+    share = (at - below)[:, None]
+    x = np.array([_inverse(row, v, fine) for row in (1 - share) * rows[below] + share * rows[below + 1]])
     return y, x
 
 
