@@ -13,17 +13,19 @@ from tests.io import corruption, files
 from tests.io.test_bvb import archive, members
 
 
+# A MERL file is 35 MB long, and all that it claims stands in its first 12 bytes: fewer copies try that as often.
 @pytest.mark.parametrize(
-    ("suffix", "make"),
-    [(".bvb", files.bvb), (".bvb", files.quantised), (".bsdf", files.bsdf), (".binary", files.merl)],
+    ("suffix", "make", "count"),
+    [(".bvb", files.bvb, 200), (".bvb", files.quantised, 200), (".bsdf", files.bsdf, 200), (".binary", files.merl, 80)],
 )
-def test_200_damaged_files_are_refused_or_harmless(suffix: str, make: Callable[[], bytes]):
-    command = [sys.executable, "-m", "tests.io.corruption", suffix, "200", "7"]
+def test_damaged_files_are_refused_or_harmless(suffix: str, make: Callable[[], bytes], count: int):
+    command = [sys.executable, "-m", "tests.io.corruption", suffix, str(count), "7"]
     done = subprocess.run(command, input=make(), capture_output=True, timeout=400, check=False)
     assert done.returncode == 0, done.stderr.decode()[-2000:]
     told = json.loads(done.stdout)
+    assert sum(told["outcomes"].values()) == count
     assert set(told["outcomes"]) <= {"refused", "harmless"}
-    assert told["outcomes"]["refused"] > 50
+    assert told["outcomes"]["refused"] > count / 4
     assert told["peak_mb"] < 1024
 
 
