@@ -144,18 +144,18 @@ def test_the_published_configuration_is_the_papers_least_squares_solution(rng):
 
 
 @pytest.mark.parametrize("chart", [HALF_DIFF, IN_OUT, RUSINKIEWICZ], ids=lambda c: c.name)
-@pytest.mark.parametrize("garbage", [1e300, -1.0, np.nan])
-def test_what_stands_in_invalid_cells_has_no_influence_on_the_model(chart, garbage):
-    models = [
+def test_what_stands_in_invalid_cells_has_no_influence_on_the_model(chart):
+    clean, *soiled = (
         fit_net(
-            _small_table(chart, np.random.default_rng(5), valid=0.7, garbage=g),
+            _small_table(chart, np.random.default_rng(5), valid=0.7, garbage=garbage),
             IN_OUT if chart is IN_OUT else HALF_DIFF,
             Root(),
             size=(7, 6, 5),
-        )
-        for g in (0.0, garbage)
-    ]
-    np.testing.assert_array_equal(models[0].spline.control, models[1].spline.control)
+        ).spline.control
+        for garbage in (0.0, 1e300, -1.0, np.nan)
+    )
+    for control in soiled:
+        np.testing.assert_array_equal(control, clean)
 
 
 def test_cells_near_grazing_have_no_influence_either(rng):
