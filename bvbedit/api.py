@@ -42,6 +42,8 @@ LARGEST_KNEE = 64_000
 # A tolerance is pursued up to so many.
 LARGEST_NET = 200_000
 TOLERANCE_TRIES = 6
+# The walk to larger nets never takes longer steps.
+STEP = 4.0
 # A net that is this much better than a tolerance asks for is tried smaller.
 TOO_GOOD = 0.9
 # Bytes that no model needs.
@@ -307,7 +309,11 @@ def _to_tolerance(
     points, good, reached = points_for(curve, tolerance), None, np.inf
     bounds = [0.0, np.inf]
     for _ in range(TOLERANCE_TRIES):
-        size = made.walk(min(points, LARGEST_NET))[-1]
+        # The first net of so many that is none of those that were not good enough.
+        walk = made.walk(int(min(max(points, STEP * bounds[0]), LARGEST_NET)))
+        size = next((n for n in walk if np.prod(n) >= points and np.prod(n) > bounds[0]), walk[-1])
+        if np.prod(size) <= bounds[0] or np.prod(size) >= bounds[1]:
+            break
         model = _settled(brdf, made, size, wish, samples, progress)
         stored = model.spline.with_control(model.storage.rounded(model.spline.control))
         error = max(samples.metrics(samples.errors_of(stored, model.encoding, wish.loss), wish.loss))
@@ -317,7 +323,7 @@ def _to_tolerance(
             good = model
             if error >= TOO_GOOD * tolerance or points == curve[0].points:
                 break
-        elif points >= 0.9 * LARGEST_NET or len(made.walk(2 * points)) == len(made.walk(points)):
+        elif points >= 0.9 * LARGEST_NET:
             break
         # The error falls with about the square root of the number of control points.
         guess = points * float(np.clip((error / (0.96 * tolerance)) ** 2, 0.3, 3.0))
@@ -327,7 +333,7 @@ def _to_tolerance(
     if good is None:
         raise BvbError(
             f"{wish.loss.name} of {tolerance:g} cannot be reached in {made.problem.chart.name}: {reached:.3g} is the "
-            f"best of {points:,} control points. Allow more, or choose another chart."
+            f"best, of up to {int(bounds[0]):,} control points. Allow more, or choose another chart."
         )
     return good
 

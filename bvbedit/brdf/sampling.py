@@ -11,6 +11,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bvbedit.brdf.charts import HALF_DIFF
 from bvbedit.brdf.density import Density
@@ -27,6 +28,8 @@ COSINE_SHARE = 0.05
 ELEVATIONS, AZIMUTHS, HEIGHTS = 24, 13, 64
 # Places in each span of s and of phi that its density is the mean of.
 PLACES_S, PLACES_PHI = 3, 2
+# Codes of a stored density for each factor of two.
+STEPS_OF_OCTAVE = 4
 # Elevations of wo stop so far above the horizon (radians).
 LOWEST = 1e-3
 
@@ -87,8 +90,7 @@ def half_vector_density(brdf: "Brdf") -> HalfVectorDensity:
     A control point is the mean of what is to be approximated under its hat function: that is never negative, and the
     integral is kept. Black materials are sampled evenly over half vectors. Raises BvbError for values not finite.
     """
-    theta = np.linspace(0, np.pi / 2, ELEVATIONS)
-    s, phi = _heights(brdf), np.linspace(0, np.pi, AZIMUTHS)
+    theta, s, phi = _nodes(brdf)
     s_at, phi_at = _places(s, PLACES_S), _places(phi, PLACES_PHI)
     wo = spherical(np.minimum(theta, np.pi / 2 - LOWEST), 0.0)
     sin_h = np.sqrt(s_at * (2 - s_at))
@@ -108,10 +110,46 @@ def half_vector_density(brdf: "Brdf") -> HalfVectorDensity:
     largest = value.max(axis=(1, 2), keepdims=True)
     value = np.divide(value, largest, out=np.ones_like(value), where=largest > 0)
     control = np.einsum("ia,kab,jb->kij", _hat_means(s, s_at), value, _hat_means(phi, phi_at))
+    return _density(control, theta, s, phi)
+
+
+def coded(density: HalfVectorDensity) -> NDArray[np.uint8]:
+    """Return the control points of a density in bytes: quarters of octaves below the largest of each theta_o, 0 for 0.
+
+    Within 9 % of what they were, which changes the noise of samples by less, and nothing else. Differences modulo 256
+    along s stand for them, so that they deflate to 4 KB.
+    """
+    p = density.spline.control[..., 0]
+    with np.errstate(divide="ignore"):
+        octaves = np.log2(p / p.max(axis=(1, 2), keepdims=True))
+    codes = np.where(p > 0, np.clip(np.rint(255 + STEPS_OF_OCTAVE * octaves), 1, 255), 0).astype(np.uint8)
+    return np.diff(codes, axis=1, prepend=np.uint8(0))
+
+
+def decoded(codes: NDArray[np.uint8], brdf: "Brdf") -> HalfVectorDensity:
+    """Return the density for ``brdf`` that ``coded`` made bytes of. Raises BvbError where it cannot be its own."""
+    nodes = _nodes(brdf)
+    size = tuple(len(x) for x in nodes)
+    if codes.dtype != np.uint8 or codes.shape != size:
+        raise BvbError(f"its pdf is {codes.dtype} of shape {codes.shape}, its knots ask for bytes of shape {size}.")
+    codes = np.cumsum(codes, axis=1, dtype=np.uint8)
+    control = np.where(codes > 0, np.exp2((codes.astype(np.float64) - 255) / STEPS_OF_OCTAVE), 0.0)
+    if not codes.any(axis=(1, 2)).all():
+        raise BvbError("its pdf is zero everywhere for some direction.")
+    return _density(control, *nodes)
+
+
+def _density(control: Floats, theta: Floats, s: Floats, phi: Floats) -> HalfVectorDensity:
+    """Return the density with control points proportional to these (K, I, J) for each theta_o."""
     columns = _running(np.ascontiguousarray(_running(control, phi)[..., -1]), s)
-    control /= columns[:, -1, None, None]
+    control = control / columns[:, -1, None, None]
     knots = [np.concatenate([[x[0]], x, [x[-1]]]) for x in (theta / theta[-1], s, phi / phi[-1])]
     return HalfVectorDensity(TensorSpline((1, 1, 1), knots, control[..., None]))
+
+
+def _nodes(brdf: "Brdf") -> tuple[Floats, Floats, Floats]:
+    """Return the nodes of theta_o, s and phi."""
+    return np.linspace(0, np.pi / 2, ELEVATIONS), _heights(brdf), np.linspace(0, np.pi, AZIMUTHS)
 
 
 def _heights(brdf: "Brdf") -> Floats:

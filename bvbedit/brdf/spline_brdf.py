@@ -8,6 +8,7 @@ import numpy as np
 
 from bvbedit.brdf.base import Brdf
 from bvbedit.brdf.charts import FITTING_CHARTS, Chart
+from bvbedit.brdf.density import Density
 from bvbedit.brdf.encodings import Encoding, check_encoding
 from bvbedit.brdf.geometry import Bools, Floats
 from bvbedit.brdf.storage import FLOAT32, Storage
@@ -21,7 +22,8 @@ class SplineBrdf(Brdf):
 
     ``spline`` has three parameters on [0, 1] and three channels. ``report`` tells how the model was fitted, as JSON
     can hold it; an edited model (``with_spline``) has none, since it would no longer be true. ``storage`` is how a file
-    holds the control points, unless another way is asked for; here they are as exact as they came.
+    holds the control points, unless another way is asked for; here they are as exact as they came. ``density`` is that
+    by which directions are drawn, where it is known; an edited model builds its own.
     Raises BvbError for a spline of another shape or domain, charts that only tables have, no Encoding, no Storage.
     """
 
@@ -35,6 +37,7 @@ class SplineBrdf(Brdf):
         report: Mapping[str, Any] | None = None,
         *,
         storage: Storage = FLOAT32,
+        density: Density | None = None,
     ) -> None:
         if spline.parameters != 3 or spline.channels != 3 or spline.domain != ((0.0, 1.0),) * 3:
             raise BvbError(f"{spline!r} on {spline.domain} is no BRDF. Give 3 parameters on [0, 1] and 3 channels.")
@@ -47,6 +50,9 @@ class SplineBrdf(Brdf):
         self.encoding = encoding
         self.storage = storage
         self.report: Mapping[str, Any] = MappingProxyType(dict(report or {}))
+        if density is not None:
+            # What the property would have to build first.
+            self.__dict__["density"] = density
 
     def __repr__(self) -> str:
         return f"<SplineBrdf {self.chart.name}, {self.encoding.name}, size {self.spline.size}>"

@@ -49,6 +49,7 @@ def fit(
     precision: str = "auto",
     thorough: bool = False,
     smoothing: Smoothing = None,
+    pdf: bool = False,
     explain: Path | None = None,
     as_json: Json = False,
 ) -> None:
@@ -91,6 +92,8 @@ def fit(
         Take more steps on the metric itself, and some seconds longer.
     smoothing
         For noisy data: auto, or a strength from 0 up; how much differences of the net are penalised.
+    pdf
+        Keep in the file, in some 4 KB more, by what renderers draw directions of light.
     explain
         A .png or .svg file to plot the error curve to: why the net has the size it has.
     as_json
@@ -139,7 +142,7 @@ def fit(
             )
         else:
             model = chosen(size=size, max_bytes=max_bytes, max_payload=max_payload, tolerance=tolerance, progress=watch)
-    api.save(model, target)
+    api.save(model, target, pdf=pdf)
     if explain is not None:
         from bvbedit.cli.explanation import plot_curve
 

@@ -39,19 +39,20 @@ def load(path: str | os.PathLike[str]) -> Brdf:
     raise BvbError(f"{path} is neither MERL, RGL, .bvb nor .npz. Name a file in one of these formats.")
 
 
-def save(model: Brdf, path: str | os.PathLike[str], *, precision: str | None = None) -> None:
+def save(model: Brdf, path: str | os.PathLike[str], *, precision: str | None = None, pdf: bool = False) -> None:
     """Write ``model`` to ``path``: a SplineBrdf as .bvb, a MeasuredBrdf as .binary (on MERL's nodes) or .npz.
 
     ``precision`` (float16, float32, float64 or quantised) is that of the control points in a .bvb file, in place of the
-    model's own storage; quantised, unless that says how, to 2**-12 of the largest. The file is written beside its
-    target and moved into place. Raises BvbError for another suffix, and where it cannot be written.
+    model's own storage; quantised, unless that says how, to 2**-12 of the largest. ``pdf`` adds to a .bvb the density
+    by which directions of light are drawn, some 4 KB, so that a renderer need not build it. The file is written beside
+    its target and moved into place. Raises BvbError for another suffix, and where it cannot be written.
     """
     suffix = as_path(path).suffix.lower()
     if isinstance(model, SplineBrdf):
         from bvbedit.io.bvb import save_bvb
 
         check_target(path, (".bvb",))
-        save_bvb(model, path, precision)
+        save_bvb(model, path, precision, pdf=pdf)
     elif isinstance(model, MeasuredBrdf):
         from bvbedit.io.merl import save_merl
         from bvbedit.io.table import save_table

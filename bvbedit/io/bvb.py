@@ -1,4 +1,4 @@
-"""The .bvb format: a zip archive of meta.json, knots_0 ..., and control; see ``dumps`` and ``loads``."""
+"""The .bvb format: a zip archive of meta.json, knots_0 ..., control, and perhaps pdf; see ``dumps`` and ``loads``."""
 
 import io
 import json
@@ -8,6 +8,7 @@ from typing import Any
 
 from bvbedit.brdf.charts import chart_named
 from bvbedit.brdf.encodings import encoding_from_dict
+from bvbedit.brdf.sampling import coded, decoded, half_vector_density
 from bvbedit.brdf.spline_brdf import SplineBrdf
 from bvbedit.brdf.storage import MOST_PLANES, Storage, storage_named, unpacked
 from bvbedit.errors import BvbError
@@ -28,12 +29,13 @@ MOST_KNOTS = 1 << 18
 MOST_CONTROL = 1 << 24
 
 
-def dumps(model: SplineBrdf, precision: str | None = None) -> bytes:
+def dumps(model: SplineBrdf, precision: str | None = None, *, pdf: bool = False) -> bytes:
     """Return ``model`` as the bytes of a .bvb file, its control points rounded to ``precision``.
 
     That is one of ``PRECISIONS``, or the model's own storage; "quantised", where that has no step, takes 2**-12 of the
-    largest |control point|. Raises BvbError for an unknown precision, control points that it cannot hold, a report
-    that is no JSON, and more of anything than ``loads`` would take.
+    largest |control point|. ``pdf`` adds the density by which directions are drawn, a few KB. Raises BvbError for an
+    unknown precision, control points that it cannot hold, a report that is no JSON, and more of anything than ``loads``
+    would take.
     """
     control = model.spline.control
     storage = model.storage
@@ -60,8 +62,9 @@ def dumps(model: SplineBrdf, precision: str | None = None) -> bytes:
             f"much for a file. Keep within {MOST_CONTROL:,}, {MOST_KNOTS:,} and {LARGEST_META:,}."
         )
     arrays = {f"knots_{axis}": knots for axis, knots in enumerate(model.spline.knots)}
+    more = {"pdf": coded(half_vector_density(model))} if pdf else {}
     stream = io.BytesIO()
-    write_archive(stream, {**arrays, "control": array}, {META: text}, level=9)
+    write_archive(stream, {**arrays, "control": array, **more}, {META: text}, level=9)
     return stream.getvalue()
 
 
@@ -99,9 +102,13 @@ def loads(content: bytes, name: str = "model") -> SplineBrdf:
         report = meta.get("report", {})
         if not isinstance(encoding, dict) or not isinstance(report, dict):
             raise BvbError("encoding and report must be objects.")
-        return SplineBrdf(
+        model = SplineBrdf(
             spline, chart_named(meta.get("chart", "")), encoding_from_dict(encoding), report, storage=storage
         )
+        if "pdf.npy" not in archive:
+            return model
+        codes = archive.array("pdf", ("uint8",), 3, MOST_CONTROL)
+        return SplineBrdf(spline, model.chart, model.encoding, report, storage=storage, density=decoded(codes, model))
     except BvbError as error:
         if str(error).startswith(name):
             raise
@@ -137,12 +144,14 @@ def _net(archive: Archive, storage: Storage, size: tuple[int, ...]) -> Array:
     return planes
 
 
-def save_bvb(model: SplineBrdf, path: str | os.PathLike[str], precision: str | None = None) -> None:
-    """Write ``model`` to ``path``, in its own storage or as ``precision`` says.
+def save_bvb(
+    model: SplineBrdf, path: str | os.PathLike[str], precision: str | None = None, *, pdf: bool = False
+) -> None:
+    """Write ``model`` to ``path``, in its own storage or as ``precision`` says, and with ``pdf`` its density.
 
     Raises BvbError as ``dumps`` does, or where the file cannot be written.
     """
-    content = dumps(model, precision)
+    content = dumps(model, precision, pdf=pdf)
     with replacing(path) as stream:
         stream.write(content)
 
