@@ -106,6 +106,13 @@ def test_a_tolerance_is_kept_on_both_sets_by_a_net_no_larger_than_needed(metric,
     assert max(errors) > 0.5 * tolerance
 
 
+def test_a_tolerance_that_the_smallest_net_just_misses_is_kept_by_another():
+    table = _exact(shape=(61, 46, 25))
+    model = bvbedit.fit(table, tolerance=0.15, metric="fores", **SHARP)
+    found = bvbedit.compare(model, table)
+    assert max(found.grid.fores, found.nodes.fores) <= 1.05 * 0.15
+
+
 def test_a_tolerance_below_what_the_data_are_off_by_is_refused_with_the_best_that_was_reached():
     table = _measured(IN_OUT, (20, 20, 20))
     message = refusal(lambda: bvbedit.fit(table, tolerance=1e-9, chart="in-out", encoding="root"))
