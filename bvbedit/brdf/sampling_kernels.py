@@ -94,11 +94,12 @@ def draw_directions(
     directions by the cosine.
     """
     for n in prange(len(wo)):
-        x, y = u[n, 0], u[n, 1]
+        x, y, half = u[n, 0], u[n, 1], 0.0
         if x < cosine_share:
             x /= cosine_share
             radius, angle = math.sqrt(x), 2.0 * math.pi * y
             wi[n, 0], wi[n, 1], wi[n, 2] = radius * math.cos(angle), radius * math.sin(angle), math.sqrt(1.0 - x)
+            half = half_density(wi[n], wo[n], theta, s, phi, p)
         else:
             x = (x - cosine_share) / (1.0 - cosine_share)
             sign = 1.0
@@ -141,7 +142,8 @@ def draw_directions(
             right = w00 * p[k, i, low + 1] + w01 * p[k, i + 1, low + 1]
             right += w10 * p[k + 1, i, low + 1] + w11 * p[k + 1, i + 1, low + 1]
             width = phi[low + 1] - phi[low]
-            angle = sign * (phi[low] + width * part_of_span(max(y - at, 0.0) / width, left, right))
+            c = part_of_span(max(y - at, 0.0) / width, left, right)
+            angle = sign * (phi[low] + width * c)
             height = s[i] + b * (s[i + 1] - s[i])
             # The half vector, and its mirror image of wo.
             radius = math.sqrt(height * (2.0 - height))
@@ -152,8 +154,10 @@ def draw_directions(
             wi[n, 0], wi[n, 1], wi[n, 2] = d * hx - wo[n, 0], d * hy - wo[n, 1], d * hz - wo[n, 2]
             if d <= 0.0:
                 wi[n, 2] = 0.0
+            else:
+                # As half_density has it, whose angles are known here.
+                half = 0.5 * ((1.0 - c) * left + c * right) / (2.0 * d)
         if wi[n, 2] > 0.0:
-            half = half_density(wi[n], wo[n], theta, s, phi, p)
             density[n] = (1.0 - cosine_share) * half + cosine_share * wi[n, 2] / math.pi
         else:
             wi[n, 0], wi[n, 1], wi[n, 2] = 0.0, 0.0, 1.0

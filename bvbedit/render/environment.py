@@ -74,6 +74,14 @@ class EnvironmentDensity:
         environment_kernels.draw_all(*tables, numbers, directions, radiance, pdf)
         return directions, radiance, pdf
 
+    def radiance(self, directions: Floats) -> Floats:
+        """Return the radiance (n, 3) that arrives from unit ``directions`` (n, 3)."""
+        from bvbedit.render import environment_kernels
+
+        radiance = np.empty((len(directions), 3))
+        environment_kernels.look_up_all(self.texels, directions, radiance)
+        return radiance
+
     def arriving(self, directions: Floats) -> tuple[Floats, Floats]:
         """Return the radiance (n, 3) that arrives from unit ``directions`` (n, 3), and their pdf (n,)."""
         from bvbedit.render import environment_kernels

@@ -25,7 +25,8 @@ RGB = tuple[float, float, float]
 def place(height: int, width: int, x: float, y: float, z: float) -> tuple[float, float]:
     """Return the row and the column of a direction in a lat-long picture; texel centres lie at whole numbers."""
     row = math.atan2(math.hypot(x, y), z) / math.pi * height - 0.5
-    column = (0.5 + math.atan2(x, y) / (2.0 * math.pi)) * width - 0.5
+    # A picture of one column is the same all around.
+    column = 0.0 if width == 1 else (0.5 + math.atan2(x, y) / (2.0 * math.pi)) * width - 0.5
     return row, column
 
 
@@ -116,6 +117,14 @@ def draw_all(
     for n in prange(len(numbers)):
         x, y, z, pdf[n] = draw(texels, rows, columns, scale, numbers[n, 0], numbers[n, 1])
         directions[n, 0], directions[n, 1], directions[n, 2] = x, y, z
+        radiance[n, 0], radiance[n, 1], radiance[n, 2] = look_up(texels, x, y, z)
+
+
+@parallel_kernel
+def look_up_all(texels: Array, directions: Floats, radiance: Floats) -> None:
+    """Write the ``radiance`` (n, 3) that arrives from unit ``directions`` (n, 3)."""
+    for n in prange(len(directions)):
+        x, y, z = directions[n, 0], directions[n, 1], directions[n, 2]
         radiance[n, 0], radiance[n, 1], radiance[n, 2] = look_up(texels, x, y, z)
 
 

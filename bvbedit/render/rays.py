@@ -51,9 +51,10 @@ def arriving(stage: Stage, directions: Floats, ends: Ends) -> tuple[Floats, Floa
     radiance, pdf = np.zeros((len(directions), 3)), np.zeros(len(directions))
     if stage.sky is not None:
         rows = np.flatnonzero(ends.which < 0)
-        radiance[rows], density = stage.sky.arriving(directions.take(rows, axis=0))
         if stage.sky_sampled:
-            pdf[rows] = density
+            radiance[rows], pdf[rows] = stage.sky.arriving(directions.take(rows, axis=0))
+        else:
+            radiance[rows] = stage.sky.radiance(directions.take(rows, axis=0))
     if len(stage.rectangles):
         first = len(stage.spheres) + len(stage.planes)
         rows = np.flatnonzero((ends.which >= first) & (ends.which < first + len(stage.rectangles)))
