@@ -180,7 +180,7 @@ def speed(console: Console, sources: dict[str, Brdf], paths: list[Path], threads
         agreement(kernels, mi, dr, name, model)
         mitsuba_spline.register(mi, dr, f"spline_{number}", model, *fitted_lobe(model))
         compared(
-            rows, f"{name}, llvm_ad_rgb, the same net", ours(model), theirs({"type": f"spline_{number}"}), "<= 1.5 x"
+            rows, f"{name}, llvm_ad_rgb, the same net", ours(model), theirs({"type": f"spline_{number}"}), "<= 0.67 x"
         )
     compared(rows, "Lambert, llvm_ad_rgb", ours(Lambert(GREY)), theirs(diffuse(GREY)), "")
     mi.set_variant("scalar_rgb")
@@ -188,7 +188,7 @@ def speed(console: Console, sources: dict[str, Brdf], paths: list[Path], threads
     for path in paths:
         if path.suffix == ".bsdf":
             measured = theirs({"type": "measured", "filename": str(path)})
-            compared(rows, f"{path.stem}, scalar_rgb, measured", ours(models[path.stem]), measured, "<= 3 x")
+            compared(rows, f"{path.stem}, scalar_rgb, measured", ours(models[path.stem]), measured, "<= 0.33 x")
     console.print(kernels)
     console.print(rows)
 

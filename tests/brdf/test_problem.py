@@ -13,7 +13,7 @@ from bvbedit.brdf.encodings import Linear, Log, Root
 from bvbedit.brdf.geometry import elevation
 from bvbedit.brdf.losses import LOSSES, SMALLEST_SHARE
 from bvbedit.brdf.measured import MeasuredBrdf
-from bvbedit.brdf.problem import BEYOND, HELD, LARGEST_SECANT, Table, charts_for, pose, secants, tabulate
+from bvbedit.brdf.problem import BEYOND, HELD, LARGEST_SECANT, Table, charts_for, on_any_chart, pose, secants, tabulate
 from bvbedit.brdf.sample_sets import node_blocks
 from bvbedit.spline.fitting import loft
 from bvbedit.spline.knots import place_knots
@@ -387,7 +387,7 @@ def test_weights_given_multiply_those_built_in(chart, loss):
     def given(p: np.ndarray) -> np.ndarray:
         return 0.5 + p[:, 0] * (p[:, 2] > 0.4)
 
-    plain, weighted = (pose(table, Root(), loss, (1.0, 1.0), w) for w in (None, given))
+    plain, weighted = (pose(table, Root(), loss, (1.0, 1.0), on_any_chart(w)) for w in (None, given))
     factors = given(grid_points(SMALL)).reshape(plain.weights.shape)
     quotient = weighted.weights / (factors * plain.weights)
     np.testing.assert_allclose(quotient, quotient[0, 0, 0], rtol=1e-12)
@@ -398,17 +398,17 @@ def test_weights_given_multiply_those_built_in(chart, loss):
 def test_weights_given_in_another_scale_are_the_same(scale):
     """The step in which a net is stored follows from the weights: their unit must not matter."""
     one, other = (
-        pose(_table(HALF_DIFF), Root(), LOG_COSINE, (0.3, 1.0), lambda p, s=s: s * (0.1 + p[:, 0]))
+        pose(_table(HALF_DIFF), Root(), LOG_COSINE, (0.3, 1.0), lambda _chart, p, s=s: s * (0.1 + p[:, 0]))
         for s in (1.0, scale)
     )
     np.testing.assert_allclose(other.weights, one.weights, rtol=1e-12)
-    flat = pose(_table(HALF_DIFF), Root(), LOG_COSINE, (0.3, 1.0), lambda p: np.full(len(p), scale))
+    flat = pose(_table(HALF_DIFF), Root(), LOG_COSINE, (0.3, 1.0), lambda _chart, p: np.full(len(p), scale))
     plain = pose(_table(HALF_DIFF), Root(), LOG_COSINE, (0.3, 1.0))
     np.testing.assert_allclose(flat.weights, plain.weights, rtol=1e-12)
 
 
 def test_weights_may_be_zero_in_parts():
-    posed = pose(_table(HALF_DIFF), Root(), LOG_COSINE, (1, 1), lambda p: p[:, 0] > 0.5)
+    posed = pose(_table(HALF_DIFF), Root(), LOG_COSINE, (1, 1), lambda _chart, p: p[:, 0] > 0.5)
     assert (posed.weights[:8] == 0).all()
     assert (posed.weights[8:] > 0).all()
 
@@ -430,7 +430,7 @@ def test_weights_may_be_zero_in_parts():
     ids=["no function", "three", "one", "none", "texts", "too few", "all zero", "negative", "nan", "infinite"],
 )
 def test_weights_that_are_none_are_refused(wrong):
-    message = refusal(lambda: pose(_table(HALF_DIFF), Root(), LOG_COSINE, (1.0, 1.0), wrong))
+    message = refusal(lambda: pose(_table(HALF_DIFF), Root(), LOG_COSINE, (1.0, 1.0), on_any_chart(wrong)))
     assert "weights" in message.lower()
 
 
