@@ -10,7 +10,7 @@ from bvbedit.render.sheet import sheet
 from bvbedit.render.tonemap import tone_map
 
 HERE = Path(__file__).parent
-SIDE, SPP, COLUMNS = 300, 256, 3
+SIDE, SPP, COLUMNS = 300, 128, 3
 SCENES = ("blob", "swatches", "backlit", "panorama", "gem")
 MATERIAL = "gold-metallic-paint"
 
