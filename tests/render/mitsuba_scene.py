@@ -26,7 +26,13 @@ def followed_everywhere(scene: Scene) -> Scene:
 
 
 def mitsuba_scene(
-    mi: ModuleType, scene: Scene, models: Sequence[Mapping[str, Any] | Any], width: int, height: int, spp: int
+    mi: ModuleType,
+    scene: Scene,
+    models: Sequence[Mapping[str, Any]],
+    width: int,
+    height: int,
+    spp: int,
+    sampler: str = "independent",
 ) -> Any:
     """Return Mitsuba's scene for spheres, planes, suns and any environment; ``models`` are its BSDFs, by number."""
     T = mi.ScalarTransform4f
@@ -49,7 +55,7 @@ def mitsuba_scene(
                 "component_format": "float32",
                 "rfilter": {"type": "box"},
             },
-            "sampler": {"type": "independent", "sample_count": spp},
+            "sampler": {"type": sampler, "sample_count": spp},
         },
     }
     for n, thing in enumerate(scene.objects):
