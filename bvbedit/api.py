@@ -130,6 +130,10 @@ def fit(
         from bvbedit.render.footprint import scene_weights
 
         wish = replace(wish, weights=scene_weights(brdf, scene, wish.loss))
+    if wish.weights is not None and is_published(wish.charts[0], wish.encodings[0], wish.knots):
+        raise BvbError(
+            "The paper's configuration weighs all alike. Leave weights and scene out, or choose other knots."
+        )
     for name, bound in (("max_bytes", max_bytes), ("max_payload", max_payload)):
         if bound is not None and (not is_whole(bound) or not 1 <= bound <= LARGEST_BUDGET):
             raise BvbError(f"{name} is {shown(bound)}. Give a whole number of bytes from 1 to {LARGEST_BUDGET:,}.")

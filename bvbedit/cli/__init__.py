@@ -13,6 +13,7 @@ app = App(
     help="Fit, edit and preview measured BRDFs as B-spline volumes.",
     help_format="plaintext",
     version_flags=["--version"],
+    suppress_keyboard_interrupt=False,  # told in words, below
 )
 # Commands are named by module, so that each pays only for what it imports.
 app.command("bvbedit.cli.models:fit")

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bvbedit.brdf.analytic.densities import Mixture
 from bvbedit.brdf.base import Brdf
 from bvbedit.brdf.density import Density
 from bvbedit.cli.output import progress
@@ -131,7 +132,8 @@ def in_a_row(shot: Shot, target: Path) -> dict[str, Any]:
 def as_differences(shot: Shot, target: Path) -> dict[str, Any]:
     """Render the first model beside the others, over what they differ by, all with the same directions of light."""
     rendering = _Rendering(shot)
-    pictures = rendering.each(shot.models[0].density)
+    # Each finds its own highlights, and all are asked along the same directions.
+    pictures = rendering.each(Mixture([model.density for model in shot.models]))
     eight = [tone_map(p, shot.exposure) for p in pictures]
     empty = np.full_like(eight[0], 255)
     errors = [compare_pictures(p, pictures[0], shot.exposure) for p in pictures[1:]]

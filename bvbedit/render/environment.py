@@ -24,16 +24,15 @@ class EnvironmentDensity:
     ``rows`` (h + 2,) and ``columns`` (h + 1, w + 1) are distribution functions from 0 to 1; a row that is black has
     zeros. ``scale`` (1/sr per unit of radiance) times the mean radiance of a patch is its density.
 
-    Two numbers, both 1 for an even light, tell whether sampling pays. ``contrast`` is the largest density over the
-    mean one. ``unevenness`` is 4 pi times the integral of the squared density: draws that are even over the sphere have
-    the relative variance unevenness - 1. A glaring spot of hardly any power has great contrast, but no unevenness.
+    ``unevenness``, 1 for an even light, tells whether sampling pays. It is 4 pi times the integral of the squared
+    density: draws that are even over the sphere have the relative variance unevenness - 1. A glaring spot of hardly any
+    power adds nothing to it.
     """
 
     texels: Texels
     rows: Floats
     columns: Floats
     scale: float
-    contrast: float
     unevenness: float
 
     @classmethod
@@ -61,7 +60,6 @@ class EnvironmentDensity:
             rows,
             columns,
             scale=1.0 / float(total),
-            contrast=4 * np.pi * float(density.max()),
             unevenness=4 * np.pi * float(np.sum(density * (power / total))),
         )
 

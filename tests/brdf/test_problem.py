@@ -13,7 +13,7 @@ from bvbedit.brdf.encodings import Linear, Log, Root
 from bvbedit.brdf.geometry import elevation
 from bvbedit.brdf.losses import LOSSES, SMALLEST_SHARE
 from bvbedit.brdf.measured import MeasuredBrdf
-from bvbedit.brdf.problem import BEYOND, HELD, LARGEST_SECANT, Table, charts_for, on_any_chart, pose, secants, tabulate
+from bvbedit.brdf.problem import BEYOND, HELD, LARGEST_SECANT, Table, charts_for, pose, secants, tabulate
 from bvbedit.brdf.sample_sets import node_blocks
 from bvbedit.spline.fitting import loft
 from bvbedit.spline.knots import place_knots
@@ -377,61 +377,6 @@ def test_nodes_without_data_hold_their_neighbours_with_a_small_weight(chart, rng
     flat = MeasuredBrdf(np.where(valid[..., None], np.ones(3), 1e4), valid, SMALL, chart)
     weights = pose(tabulate(flat, chart), Linear(), LOSSES["relative_l1"], (0.4, 1.0)).weights
     np.testing.assert_allclose(weights[~valid], HELD * 1.4, rtol=1e-12)
-
-
-@each_chart
-@each_loss
-def test_weights_given_multiply_those_built_in(chart, loss):
-    table = _table(chart)
-
-    def given(p: np.ndarray) -> np.ndarray:
-        return 0.5 + p[:, 0] * (p[:, 2] > 0.4)
-
-    plain, weighted = (pose(table, Root(), loss, (1.0, 1.0), on_any_chart(w)) for w in (None, given))
-    factors = given(grid_points(SMALL)).reshape(plain.weights.shape)
-    quotient = weighted.weights / (factors * plain.weights)
-    np.testing.assert_allclose(quotient, quotient[0, 0, 0], rtol=1e-12)
-    np.testing.assert_array_equal(weighted.values, plain.values)
-
-
-@pytest.mark.parametrize("scale", [1e-300, 1e-3, 1e3, 1e300])
-def test_weights_given_in_another_scale_are_the_same(scale):
-    """The step in which a net is stored follows from the weights: their unit must not matter."""
-    one, other = (
-        pose(_table(HALF_DIFF), Root(), LOG_COSINE, (0.3, 1.0), lambda _chart, p, s=s: s * (0.1 + p[:, 0]))
-        for s in (1.0, scale)
-    )
-    np.testing.assert_allclose(other.weights, one.weights, rtol=1e-12)
-    flat = pose(_table(HALF_DIFF), Root(), LOG_COSINE, (0.3, 1.0), lambda _chart, p: np.full(len(p), scale))
-    plain = pose(_table(HALF_DIFF), Root(), LOG_COSINE, (0.3, 1.0))
-    np.testing.assert_allclose(flat.weights, plain.weights, rtol=1e-12)
-
-
-def test_weights_may_be_zero_in_parts():
-    posed = pose(_table(HALF_DIFF), Root(), LOG_COSINE, (1, 1), lambda _chart, p: p[:, 0] > 0.5)
-    assert (posed.weights[:8] == 0).all()
-    assert (posed.weights[8:] > 0).all()
-
-
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        3.0,
-        lambda p: p,
-        lambda p: 1.0,  # noqa: ARG005
-        lambda p: None,  # noqa: ARG005
-        lambda p: ["a"] * len(p),
-        lambda p: np.ones(len(p) - 1),
-        lambda p: np.zeros(len(p)),
-        lambda p: -p[:, 0],
-        lambda p: np.where(p[:, 0] > 0.5, np.nan, 1.0),
-        lambda p: np.where(p[:, 0] > 0.5, np.inf, 1.0),
-    ],
-    ids=["no function", "three", "one", "none", "texts", "too few", "all zero", "negative", "nan", "infinite"],
-)
-def test_weights_that_are_none_are_refused(wrong):
-    message = refusal(lambda: pose(_table(HALF_DIFF), Root(), LOG_COSINE, (1.0, 1.0), on_any_chart(wrong)))
-    assert "weights" in message.lower()
 
 
 @pytest.mark.parametrize(("reciprocal", "sides"), [(True, 2), (False, 4)])
