@@ -13,7 +13,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 def _compile(function: F, **options: Any) -> F:
     try:
-        return numba.njit(cache=True, **options)(function)  # type: ignore[no-any-return]
+        return numba.njit(cache=True, error_model="numpy", **options)(function)  # type: ignore[no-any-return]
     except RuntimeError:
         # No cache directory can be written (a read-only installation): compile in each process instead.
         return numba.njit(**options)(function)  # type: ignore[no-any-return]
@@ -25,6 +25,14 @@ def kernel(function: F) -> F:
     Its arguments are taken to be right: nothing is checked inside.
     """
     return _compile(function, nogil=True)
+
+
+def inlined_kernel(function: F) -> F:
+    """Compile ``function`` into whoever calls it: a small step of a hot loop.
+
+    Otherwise each call would count references to the arrays handed over, atomically, which costs more than the work.
+    """
+    return _compile(function, nogil=True, forceinline=True)
 
 
 def parallel_kernel(function: F) -> F:

@@ -107,20 +107,25 @@ class Brdf(ABC):
 
     def evaluate_unit(self, wi: Floats, wo: Floats) -> tuple[Floats, Bools]:
         """Return ``evaluate_trusted`` for arrays (n, 3) that are known to hold unit vectors; nothing is checked."""
-        f = np.zeros((len(wi), 3))
-        trusted = np.zeros(len(wi), dtype=bool)
+        blocks = [slice(start, start + BLOCK) for start in range(0, len(wi), BLOCK)]
+        found = [self._evaluate_block(np.ascontiguousarray(wi[b]), np.ascontiguousarray(wo[b])) for b in blocks]
+        if len(found) == 1:
+            return found[0]
+        if not found:
+            return np.zeros((0, 3)), np.zeros(0, dtype=bool)
+        return np.concatenate([f for f, _ in found]), np.concatenate([trusted for _, trusted in found])
+
+    def _evaluate_block(self, wi: Floats, wo: Floats) -> tuple[Floats, Bools]:
+        smaller = np.minimum(wi[:, 2], wo[:, 2])
         lowest = np.cos(self.reliable_elevation)
-        for start in range(0, len(wi), BLOCK):
-            block = slice(start, start + BLOCK)
-            i, o = np.ascontiguousarray(wi[block]), np.ascontiguousarray(wo[block])
-            smaller = np.minimum(i[:, 2], o[:, 2])
-            above = smaller >= 0
-            if above.all():
-                f[block], backed = self._evaluate(i, o)
-                trusted[block] = backed & (smaller >= lowest)
-            elif above.any():
-                f[block][above], backed = self._evaluate(i[above], o[above])
-                trusted[block][above] = backed & (smaller[above] >= lowest)
+        above = smaller >= 0
+        if above.all():
+            f, backed = self._evaluate(wi, wo)
+            return f, backed & (smaller >= lowest)
+        f, trusted = np.zeros((len(wi), 3)), np.zeros(len(wi), dtype=bool)
+        if above.any():
+            f[above], backed = self._evaluate(wi[above], wo[above])
+            trusted[above] = backed & (smaller[above] >= lowest)
         return f, trusted
 
 

@@ -5,15 +5,16 @@ import math
 import numpy as np
 from numba import prange
 
+from bvbedit.brdf.angle_kernels import upper_atan2
 from bvbedit.brdf.geometry import Floats
-from bvbedit.jit import kernel, parallel_kernel
+from bvbedit.jit import inlined_kernel, kernel, parallel_kernel
 
 HALF_PI = math.pi / 2
 # Below this cosine of theta_h the horizon of the difference angle is the quotient of two roundings.
 HORIZON_COSINE = 1e-12
 
 
-@kernel
+@inlined_kernel
 def half_difference(
     wix: float, wiy: float, wiz: float, wox: float, woy: float, woz: float
 ) -> tuple[float, float, float, float]:
@@ -26,13 +27,13 @@ def half_difference(
     kx, ky, kz = wix - wox, wiy - woy, wiz - woz
     s = math.sqrt(sx * sx + sy * sy + sz * sz)
     k = math.sqrt(kx * kx + ky * ky + kz * kz)
-    horizontal = math.hypot(sx, sy)
+    horizontal = math.sqrt(sx * sx + sy * sy)
     if s == 0.0:  # wi = -wo: h = n
         horizontal, sz, s = 0.0, 1.0, 1.0
         theta_d = HALF_PI
     else:
-        theta_d = math.atan2(k, s)
-    theta_h = math.atan2(horizontal, sz)
+        theta_d = upper_atan2(k, s)
+    theta_h = upper_atan2(horizontal, sz)
     cos_phi, sin_phi = 1.0, 0.0
     if horizontal > 0.0:
         cos_phi, sin_phi = sx / horizontal, sy / horizontal
@@ -42,13 +43,13 @@ def half_difference(
     return theta_h, theta_d, dx + 0.0, dy + 0.0
 
 
-@kernel
+@inlined_kernel
 def horizon(theta_h: float, cos_phi_d: float) -> float:
     """Return theta_d_max, the difference angle at which one of the directions reaches the horizon."""
     c = math.cos(theta_h)
     if c < HORIZON_COSINE:
         return HALF_PI
-    return math.atan2(c, math.sin(theta_h) * abs(cos_phi_d))
+    return upper_atan2(c, math.sin(theta_h) * abs(cos_phi_d))
 
 
 @parallel_kernel
@@ -56,7 +57,7 @@ def half_diff_parameters(wi: Floats, wo: Floats) -> Floats:
     p = np.empty((len(wi), 3))
     for n in prange(len(wi)):
         theta_h, theta_d, dx, dy = half_difference(wi[n, 0], wi[n, 1], wi[n, 2], wo[n, 0], wo[n, 1], wo[n, 2])
-        phi_d = math.atan2(abs(dy), abs(dx))
+        phi_d = upper_atan2(abs(dy), abs(dx))
         p[n, 0] = min(1.0, math.sqrt(theta_h / HALF_PI))
         p[n, 1] = min(1.0, theta_d / horizon(theta_h, math.cos(phi_d)))
         p[n, 2] = min(1.0, phi_d / HALF_PI)
@@ -115,10 +116,9 @@ def in_out_parameters(wi: Floats, wo: Floats) -> Floats:
     for n in prange(len(wi)):
         cross = wi[n, 0] * wo[n, 1] - wi[n, 1] * wo[n, 0]
         dot = wi[n, 0] * wo[n, 0] + wi[n, 1] * wo[n, 1]
-        p[n, 0] = min(1.0, math.atan2(math.hypot(wi[n, 0], wi[n, 1]), wi[n, 2]) / HALF_PI)
-        p[n, 1] = min(1.0, math.atan2(math.hypot(wo[n, 0], wo[n, 1]), wo[n, 2]) / HALF_PI)
-        # Adding zero makes a negative zero positive: at normal incidence phi is 0, not pi.
-        p[n, 2] = min(1.0, math.atan2(abs(cross), dot + 0.0) / math.pi)
+        p[n, 0] = min(1.0, upper_atan2(math.sqrt(wi[n, 0] ** 2 + wi[n, 1] ** 2), wi[n, 2]) / HALF_PI)
+        p[n, 1] = min(1.0, upper_atan2(math.sqrt(wo[n, 0] ** 2 + wo[n, 1] ** 2), wo[n, 2]) / HALF_PI)
+        p[n, 2] = min(1.0, upper_atan2(abs(cross), dot) / math.pi)
     return p
 
 

@@ -6,55 +6,74 @@ import numpy as np
 from numba import prange
 from numpy.typing import NDArray
 
-from bvbedit.jit import kernel, parallel_kernel
+from bvbedit.brdf.angle_kernels import upper_atan2
+from bvbedit.jit import inlined_kernel, parallel_kernel
 
 Floats = NDArray[np.float64]
 
 # A density is a spline of degree one in each of (theta_o, s, phi), s = 1 - cos theta_h, phi the azimuth of h relative
 # to that of wo without its sign: ``p`` (K, I, J) are its values at the nodes ``theta`` (K,), ``s`` (I,) and ``phi``
-# (J,). Its integrals are splines of degree two, given at the same nodes: ``rows`` (K, I, J) from 0 to phi,
-# ``marginals`` (K, I) over all phi, ``columns`` (K, I) of these from 0 to s. Each layer k integrates to one.
+# (J,), of which ``theta`` and ``phi`` are evenly spaced from 0. Its integrals are splines of degree two, given at the
+# same nodes: ``rows`` (K, I, J) from 0 to phi, ``marginals`` (K, I) over all phi, ``columns`` (K, I) of these from 0
+# to s. Each layer k integrates to one.
 
 
-@kernel
+@inlined_kernel
 def below(nodes: Floats, x: float) -> tuple[int, float]:
     """Return the interval of ``nodes`` that holds ``x`` and where in it x is, from 0 to 1."""
-    i = min(max(int(np.searchsorted(nodes, x, side="right")) - 1, 0), len(nodes) - 2)
-    return i, min(max((x - nodes[i]) / (nodes[i + 1] - nodes[i]), 0.0), 1.0)
+    low, high = 0, len(nodes) - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if nodes[middle] <= x:
+            low = middle
+        else:
+            high = middle
+    return low, min(max((x - nodes[low]) / (nodes[low + 1] - nodes[low]), 0.0), 1.0)
 
 
-@kernel
-def half_density(wi: Floats, wo: Floats, theta: Floats, s: Floats, phi: Floats, p: Floats) -> float:
-    """Return the density of wi over solid angle that the density of half vectors makes."""
-    hx, hy, hz = wi[0] + wo[0], wi[1] + wo[1], wi[2] + wo[2]
+@inlined_kernel
+def below_even(nodes: Floats, x: float) -> tuple[int, float]:
+    """Return the same for nodes that begin at 0 and are evenly spaced."""
+    place = max(x, 0.0) * (len(nodes) - 1) / nodes[-1]
+    low = min(int(place), len(nodes) - 2)
+    return low, min(place - low, 1.0)
+
+
+@inlined_kernel
+def half_density(
+    ix: float,
+    iy: float,
+    iz: float,
+    ox: float,
+    oy: float,
+    oz: float,
+    theta: Floats,
+    s: Floats,
+    phi: Floats,
+    p: Floats,
+) -> float:
+    """Return the density of wi = i over solid angle, given wo = o, that the density of half vectors makes."""
+    hx, hy, hz = ix + ox, iy + oy, iz + oz
     length = math.sqrt(hx * hx + hy * hy + hz * hz)
     if length == 0.0 or hz <= 0.0:
         return 0.0
     hx, hy, hz = hx / length, hy / length, hz / length
-    k, a = below(theta, math.atan2(math.hypot(wo[0], wo[1]), wo[2]))
+    sine = math.sqrt(ox * ox + oy * oy)
+    k, a = below_even(theta, upper_atan2(sine, oz))
     # 1 - cos, without the loss of digits near the pole.
     i, b = below(s, (hx * hx + hy * hy) / (1.0 + hz))
-    ox, oy = azimuth(wo)
-    j, c = below(phi, math.atan2(abs(ox * hy - oy * hx), ox * hx + oy * hy + 0.0))
+    ax, ay = (ox / sine, oy / sine) if sine > 0.0 else (1.0, 0.0)
+    j, c = below_even(phi, upper_atan2(abs(ax * hy - ay * hx), ax * hx + ay * hy))
     value = 0.0
     for x in range(2):
         for y in range(2):
             w = (a if x else 1.0 - a) * (b if y else 1.0 - b)
             value += w * ((1.0 - c) * p[k + x, i + y, j] + c * p[k + x, i + y, j + 1])
     # Half for either sign of phi.
-    return float(0.5 * value / (4.0 * (wo[0] * hx + wo[1] * hy + wo[2] * hz)))
+    return 0.5 * value / (4.0 * (ox * hx + oy * hy + oz * hz))
 
 
-@kernel
-def azimuth(w: Floats) -> tuple[float, float]:
-    """Return the unit vector of the azimuth of ``w``; (1, 0) at the pole."""
-    length = math.hypot(w[0], w[1])
-    if length == 0.0:
-        return 1.0, 0.0
-    return w[0] / length, w[1] / length
-
-
-@kernel
+@inlined_kernel
 def part_of_span(rest: float, left: float, right: float) -> float:
     """Return x in [0, 1] up to which a density that runs from ``left`` to ``right`` holds ``rest`` of a unit span."""
     root = math.sqrt(max(left * left + 2.0 * (right - left) * rest, 0.0))
@@ -64,12 +83,22 @@ def part_of_span(rest: float, left: float, right: float) -> float:
 
 
 @parallel_kernel
+def draw_by_cosine(u: Floats, wi: Floats, density: Floats) -> None:
+    """Write ``wi`` (n, 3) drawn by ``u`` (n, 2) in [0, 1), and their ``density`` (n,), the cosine over pi."""
+    for n in prange(len(u)):
+        radius, angle, height = math.sqrt(u[n, 0]), 2.0 * math.pi * u[n, 1], math.sqrt(1.0 - u[n, 0])
+        wi[n, 0], wi[n, 1], wi[n, 2] = radius * math.cos(angle), radius * math.sin(angle), height
+        density[n] = height / math.pi
+
+
+@parallel_kernel
 def density_of(
     wi: Floats, wo: Floats, theta: Floats, s: Floats, phi: Floats, p: Floats, cosine_share: float, out: Floats
 ) -> None:
     """Write the density of ``wi`` (n, 3) over solid angle, given ``wo`` (n, 3), into ``out`` (n,)."""
     for n in prange(len(wi)):
-        half = half_density(wi[n], wo[n], theta, s, phi, p)
+        ix, iy, iz, ox, oy, oz = wi[n, 0], wi[n, 1], wi[n, 2], wo[n, 0], wo[n, 1], wo[n, 2]
+        half = half_density(ix, iy, iz, ox, oy, oz, theta, s, phi, p)
         out[n] = (1.0 - cosine_share) * half + cosine_share * wi[n, 2] / math.pi
 
 
@@ -95,11 +124,12 @@ def draw_directions(
     """
     for n in prange(len(wo)):
         x, y, half = u[n, 0], u[n, 1], 0.0
+        ox, oy, oz = wo[n, 0], wo[n, 1], wo[n, 2]
         if x < cosine_share:
             x /= cosine_share
             radius, angle = math.sqrt(x), 2.0 * math.pi * y
-            wi[n, 0], wi[n, 1], wi[n, 2] = radius * math.cos(angle), radius * math.sin(angle), math.sqrt(1.0 - x)
-            half = half_density(wi[n], wo[n], theta, s, phi, p)
+            ix, iy, iz = radius * math.cos(angle), radius * math.sin(angle), math.sqrt(1.0 - x)
+            half = half_density(ix, iy, iz, ox, oy, oz, theta, s, phi, p)
         else:
             x = (x - cosine_share) / (1.0 - cosine_share)
             sign = 1.0
@@ -107,7 +137,8 @@ def draw_directions(
                 y = 2.0 * y
             else:
                 y, sign = 2.0 * y - 1.0, -1.0
-            k, a = below(theta, math.atan2(math.hypot(wo[n, 0], wo[n, 1]), wo[n, 2]))
+            sine = math.sqrt(ox * ox + oy * oy)
+            k, a = below_even(theta, upper_atan2(sine, oz))
             # s: the last node whose distribution function is not above x.
             low, high = 0, len(s) - 1
             while high - low > 1:
@@ -147,18 +178,19 @@ def draw_directions(
             height = s[i] + b * (s[i + 1] - s[i])
             # The half vector, and its mirror image of wo.
             radius = math.sqrt(height * (2.0 - height))
-            ox, oy = azimuth(wo[n])
+            ax, ay = (ox / sine, oy / sine) if sine > 0.0 else (1.0, 0.0)
             cosine, sine = math.cos(angle), math.sin(angle)
-            hx, hy, hz = radius * (ox * cosine - oy * sine), radius * (oy * cosine + ox * sine), 1.0 - height
-            d = 2.0 * (wo[n, 0] * hx + wo[n, 1] * hy + wo[n, 2] * hz)
-            wi[n, 0], wi[n, 1], wi[n, 2] = d * hx - wo[n, 0], d * hy - wo[n, 1], d * hz - wo[n, 2]
+            hx, hy, hz = radius * (ax * cosine - ay * sine), radius * (ay * cosine + ax * sine), 1.0 - height
+            d = 2.0 * (ox * hx + oy * hy + oz * hz)
+            ix, iy, iz = d * hx - ox, d * hy - oy, d * hz - oz
             if d <= 0.0:
-                wi[n, 2] = 0.0
+                iz = 0.0
             else:
                 # As half_density has it, whose angles are known here.
                 half = 0.5 * ((1.0 - c) * left + c * right) / (2.0 * d)
-        if wi[n, 2] > 0.0:
-            density[n] = (1.0 - cosine_share) * half + cosine_share * wi[n, 2] / math.pi
+        if iz > 0.0:
+            wi[n, 0], wi[n, 1], wi[n, 2] = ix, iy, iz
+            density[n] = (1.0 - cosine_share) * half + cosine_share * iz / math.pi
         else:
             wi[n, 0], wi[n, 1], wi[n, 2] = 0.0, 0.0, 1.0
             density[n] = 0.0

@@ -75,7 +75,7 @@ class SplineBrdf(Brdf):
         return SplineBrdf(self.spline, self.chart, self.encoding, {**self.report, **more}, storage=self.storage)
 
     def _evaluate(self, wi: Floats, wo: Floats) -> tuple[Floats, Bools]:
-        f = self.encoding.decode(self.spline.evaluate(self.chart.to_parameters(wi, wo)))
+        f = self.encoding.decode(self.spline.evaluate_inside(self.chart.to_parameters(wi, wo)))
         return f, np.ones(len(f), dtype=bool)
 
 

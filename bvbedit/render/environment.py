@@ -63,31 +63,6 @@ class EnvironmentDensity:
             unevenness=4 * np.pi * float(np.sum(density * (power / total))),
         )
 
-    def draw(self, numbers: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return unit directions (n, 3) drawn by ``numbers`` (n, 2) in [0, 1), their radiance (n, 3) and pdf (n,)."""
-        from bvbedit.render import environment_kernels
-
-        directions, radiance, pdf = np.empty((len(numbers), 3)), np.empty((len(numbers), 3)), np.empty(len(numbers))
-        tables = (self.texels, self.rows, self.columns, self.scale)
-        environment_kernels.draw_all(*tables, numbers, directions, radiance, pdf)
-        return directions, radiance, pdf
-
-    def radiance(self, directions: Floats) -> Floats:
-        """Return the radiance (n, 3) that arrives from unit ``directions`` (n, 3)."""
-        from bvbedit.render import environment_kernels
-
-        radiance = np.empty((len(directions), 3))
-        environment_kernels.look_up_all(self.texels, directions, radiance)
-        return radiance
-
-    def arriving(self, directions: Floats) -> tuple[Floats, Floats]:
-        """Return the radiance (n, 3) that arrives from unit ``directions`` (n, 3), and their pdf (n,)."""
-        from bvbedit.render import environment_kernels
-
-        radiance, pdf = np.empty((len(directions), 3)), np.empty(len(directions))
-        environment_kernels.arriving(self.texels, self.scale, directions, radiance, pdf)
-        return radiance, pdf
-
 
 def solid_angles(height: int, width: int) -> Floats:
     """Return the solid angle (height + 1,) in steradians of one patch in each row, from zenith to nadir."""

@@ -11,26 +11,26 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
-from bvbedit.jit import kernel, parallel_kernel
+from bvbedit.brdf.angle_kernels import upper_atan2
+from bvbedit.jit import inlined_kernel, kernel
 
 Array = NDArray[Any]
 Floats = NDArray[np.float64]
 RGB = tuple[float, float, float]
 
 
-@kernel
+@inlined_kernel
 def place(height: int, width: int, x: float, y: float, z: float) -> tuple[float, float]:
     """Return the row and the column of a direction in a lat-long picture; texel centres lie at whole numbers."""
-    row = math.atan2(math.hypot(x, y), z) / math.pi * height - 0.5
+    row = upper_atan2(math.sqrt(x * x + y * y), z) / math.pi * height - 0.5
     # A picture of one column is the same all around.
     column = 0.0 if width == 1 else (0.5 + math.atan2(x, y) / (2.0 * math.pi)) * width - 0.5
     return row, column
 
 
-@kernel
+@inlined_kernel
 def look_up(texels: Array, x: float, y: float, z: float) -> RGB:
     """Return the radiance that arrives from a unit direction: the lat-long picture, bilinear, wrapped in azimuth."""
     height, width = texels.shape[0], texels.shape[1]
@@ -38,21 +38,28 @@ def look_up(texels: Array, x: float, y: float, z: float) -> RGB:
     r, c = math.floor(row), math.floor(column)
     a, b = row - r, column - c
     r0, r1 = max(r, 0), min(r + 1, height - 1)
-    c0, c1 = c % width, (c + 1) % width
+    c0, c1 = wrapped(c, width), wrapped(c + 1, width)
     w00, w01, w10, w11 = (1 - a) * (1 - b), (1 - a) * b, a * (1 - b), a * b
-    p, q, s, t = texels[r0, c0], texels[r0, c1], texels[r1, c0], texels[r1, c1]
     return (
-        w00 * p[0] + w01 * q[0] + w10 * s[0] + w11 * t[0],
-        w00 * p[1] + w01 * q[1] + w10 * s[1] + w11 * t[1],
-        w00 * p[2] + w01 * q[2] + w10 * s[2] + w11 * t[2],
+        w00 * texels[r0, c0, 0] + w01 * texels[r0, c1, 0] + w10 * texels[r1, c0, 0] + w11 * texels[r1, c1, 0],
+        w00 * texels[r0, c0, 1] + w01 * texels[r0, c1, 1] + w10 * texels[r1, c0, 1] + w11 * texels[r1, c1, 1],
+        w00 * texels[r0, c0, 2] + w01 * texels[r0, c1, 2] + w10 * texels[r1, c0, 2] + w11 * texels[r1, c1, 2],
     )
 
 
-@kernel
+@inlined_kernel
+def wrapped(column: int, width: int) -> int:
+    """Return a column from -1 to width on the sphere: modulo the width, without a division."""
+    if column < 0:
+        return column + width
+    return column - width if column >= width else column
+
+
+@inlined_kernel
 def patch_mean(texels: Array, i: int, j: int) -> float:
     """Return the mean over channels of the bilinear look-up in patch (i, j), even in row and column."""
     r0, r1 = max(i - 1, 0), min(i, texels.shape[0] - 1)
-    c1 = (j + 1) % texels.shape[1]
+    c1 = wrapped(j + 1, texels.shape[1])
     total = 0.0
     for k in range(3):
         # One by one, in float64: sums of the largest float32 would overflow.
@@ -63,12 +70,12 @@ def patch_mean(texels: Array, i: int, j: int) -> float:
     return total / 12.0
 
 
-@kernel
+@inlined_kernel
 def pdf_of(texels: Array, scale: float, x: float, y: float, z: float) -> float:
     """Return the density over solid angle with which ``draw`` draws a unit direction."""
     height, width = texels.shape[0], texels.shape[1]
     row, column = place(height, width, x, y, z)
-    return scale * patch_mean(texels, math.floor(row) + 1, math.floor(column) % width)
+    return scale * patch_mean(texels, math.floor(row) + 1, wrapped(math.floor(column), width))
 
 
 @kernel
@@ -100,38 +107,3 @@ def draw(
     azimuth = ((j + 0.5 + b) / width - 0.5) * 2.0 * math.pi
     x, y = radius * math.sin(azimuth), radius * math.cos(azimuth)
     return x, y, z, pdf_of(texels, scale, x, y, z)
-
-
-@parallel_kernel
-def draw_all(
-    texels: Array,
-    rows: Floats,
-    columns: Floats,
-    scale: float,
-    numbers: Floats,
-    directions: Floats,
-    radiance: Floats,
-    pdf: Floats,
-) -> None:
-    """Write ``directions`` (n, 3) drawn by ``numbers`` (n, 2) in [0, 1), their ``radiance`` (n, 3) and ``pdf`` (n,)."""
-    for n in prange(len(numbers)):
-        x, y, z, pdf[n] = draw(texels, rows, columns, scale, numbers[n, 0], numbers[n, 1])
-        directions[n, 0], directions[n, 1], directions[n, 2] = x, y, z
-        radiance[n, 0], radiance[n, 1], radiance[n, 2] = look_up(texels, x, y, z)
-
-
-@parallel_kernel
-def look_up_all(texels: Array, directions: Floats, radiance: Floats) -> None:
-    """Write the ``radiance`` (n, 3) that arrives from unit ``directions`` (n, 3)."""
-    for n in prange(len(directions)):
-        x, y, z = directions[n, 0], directions[n, 1], directions[n, 2]
-        radiance[n, 0], radiance[n, 1], radiance[n, 2] = look_up(texels, x, y, z)
-
-
-@parallel_kernel
-def arriving(texels: Array, scale: float, directions: Floats, radiance: Floats, pdf: Floats) -> None:
-    """Write the ``radiance`` (n, 3) that arrives from unit ``directions`` (n, 3), and their ``pdf`` (n,)."""
-    for n in prange(len(directions)):
-        x, y, z = directions[n, 0], directions[n, 1], directions[n, 2]
-        radiance[n, 0], radiance[n, 1], radiance[n, 2] = look_up(texels, x, y, z)
-        pdf[n] = pdf_of(texels, scale, x, y, z)

@@ -29,7 +29,7 @@ Picture = NDArray[np.float32]
 
 MAX_SIDE = 8192
 MAX_SPP = 65536
-# Paths in flight on each thread, some 500 bytes each: arrays that fit into the caches.
+# Paths in flight on each thread, some 500 bytes each: arrays that nearly fit into the caches.
 WAVE = 1 << 13
 # Samples of a pixel in one pass: first few, so that there soon is a picture.
 PASSES = (1, 1, 2, 4, 8)

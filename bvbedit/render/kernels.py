@@ -1,18 +1,19 @@
-"""The wavefront's steps: rays from pixels, surfaces where they end, light that comes from there. Compiled, unchecked.
+"""The wavefront's steps: rays from pixels, surfaces where they end, what is looked up there. Compiled, unchecked.
 
-A wave is a run of pixels with the same samples of each: slot m is sample ``first_sample + m % samples`` of pixel
-``first + m // samples``. Its random numbers depend on seed, pixel and sample alone. Materials are not known here.
+Each runs on one thread: waves are what threads share. Materials are known by their numbers alone. Kernels are handed
+arrays one by one, and take no views of rows: for tuples of arrays and for views numba counts references inside the
+loops, which was measured to cost ten times the work.
 """
 
 import math
 from typing import Any
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
-from bvbedit.jit import kernel, parallel_kernel
-from bvbedit.render.geometry import to_local, to_world
+from bvbedit.jit import inlined_kernel, kernel
+from bvbedit.render.environment_kernels import look_up, pdf_of
+from bvbedit.render.geometry import NEVER, first_met, rectangle_area, to_local, to_world
 from bvbedit.render.sequence import mix, point
 
 Array = NDArray[Any]
@@ -21,245 +22,269 @@ Cut = tuple[int, int, int, np.uint64]
 
 # The pair of random numbers that places a ray in its pixel; the others follow.
 PIXEL = 0
+# How light that a material's density finds is counted: all of it, by the balance heuristic, or only of what no light
+# sampling finds.
+ALL, BALANCED, ONLY_UNSAMPLED = 0, 1, 2
 
 
 @kernel
-def number(cut: Cut, slot: int, pair: int) -> tuple[float, float]:
-    """Return a pair of random numbers of a slot."""
-    first, first_sample, samples, seed = cut
-    return point(mix(seed, np.uint64(first + slot // samples)), first_sample + slot % samples, pair)
-
-
-@parallel_kernel
-def numbers(cut: Cut, slots: Array, pair: int, out: Array) -> None:
-    """Write a pair of random numbers (n, 2) for each of ``slots`` (n,)."""
-    for m in prange(len(slots)):
-        out[m, 0], out[m, 1] = number(cut, slots[m], pair)
-
-
-@parallel_kernel
-def camera_rays(cut: Cut, shape: tuple[int, int], camera: Array, origins: Array, directions: Array) -> None:
-    """Write rays (m, 3), (m, 3) through random places in the pixels of a wave of a picture of ``shape`` (h, w).
-
-    ``camera`` (4, 3): position, then right, up and forward, where up reaches the upper edge and right is as long.
-    """
-    height, width = shape
-    for m in prange(len(origins)):
-        row, column = divmod(cut[0] + m // cut[2], width)
-        u, v = number(cut, m, PIXEL)
-        a, b = (2.0 * (column + u) - width) / height, 1.0 - 2.0 * (row + v) / height
-        dx = camera[3, 0] + a * camera[1, 0] + b * camera[2, 0]
-        dy = camera[3, 1] + a * camera[1, 1] + b * camera[2, 1]
-        dz = camera[3, 2] + a * camera[1, 2] + b * camera[2, 2]
-        length = math.sqrt(dx * dx + dy * dy + dz * dz)
-        origins[m, 0], origins[m, 1], origins[m, 2] = camera[0, 0], camera[0, 1], camera[0, 2]
-        directions[m, 0], directions[m, 1], directions[m, 2] = dx / length, dy / length, dz / length
-
-
-@parallel_kernel
-def surfaces(
+def camera_rays(
+    cut: Cut,
+    shape: tuple[int, int],
+    camera: Array,
+    spheres: Array,
+    planes: Array,
+    rectangles: Array,
+    states: Array,
+    samples: Array,
     origins: Array,
     directions: Array,
     distance: Array,
     which: Array,
+) -> None:
+    """Write Draws and Rays through random places in the pixels of a wave of a picture of ``shape`` (h, w).
+
+    A wave is a run of pixels with the same samples of each: slot m is sample ``first_sample + m % samples`` of pixel
+    ``first + m // samples``. ``camera`` (4, 3): position, then right, up and forward, where up reaches the upper edge
+    and right is as long.
+    """
+    first, first_sample, each, seed = cut
+    height, width = shape
+    for p in range(len(which) // each):
+        row, column = divmod(first + p, width)
+        state = mix(seed, np.uint64(first + p))
+        for k in range(each):
+            m = p * each + k
+            states[m], samples[m] = state, first_sample + k
+            u, v = point(state, first_sample + k, PIXEL)
+            a, b = (2.0 * (column + u) - width) / height, 1.0 - 2.0 * (row + v) / height
+            x = camera[3, 0] + a * camera[1, 0] + b * camera[2, 0]
+            y = camera[3, 1] + a * camera[1, 1] + b * camera[2, 1]
+            z = camera[3, 2] + a * camera[1, 2] + b * camera[2, 2]
+            length = math.sqrt(x * x + y * y + z * z)
+            x, y, z = x / length, y / length, z / length
+            for c in range(3):
+                origins[m, c] = camera[0, c]
+            directions[m, 0], directions[m, 1], directions[m, 2] = x, y, z
+            distance[m], which[m] = first_met(
+                camera[0, 0], camera[0, 1], camera[0, 2], x, y, z, NEVER, spheres, planes, rectangles
+            )
+
+
+@kernel
+def numbers(states: Array, samples: Array, slots: Array, pair: int) -> Array:
+    """Return a pair of random numbers (n, 2) for each of ``slots`` (n,)."""
+    out = np.empty((len(slots), 2))
+    for n in range(len(slots)):
+        out[n, 0], out[n, 1] = point(states[slots[n]], samples[slots[n]], pair)
+    return out
+
+
+@kernel
+def meet(
+    origins: Array,
+    directions: Array,
+    distance: Array,
+    which: Array,
+    slots: Array,
+    wanted: Array,
+    mesh_faces: Array,
+    mesh_normals: Array,
     spheres: Array,
     planes: Array,
+    material_of: Array,
+    gathers: Array,
+    materials: int,
     lift: float,
-    faces: Array,
-    normal: Array,
-    position: Array,
-    wo: Array,
-) -> None:
-    """Write what rays (n, 3), (n, 3) find at ``distance`` (n,) on object ``which`` (n,), all of them on one.
+) -> tuple[Array, Array, Array, Array, Array, Array, Array, Array]:
+    """Return Vertices where those Rays end that are ``wanted`` (n,), and where each material starts among them.
 
-    ``faces`` (n, 3) and ``normal`` (n, 3), geometric and for shading, are read where the object is a mesh and written
-    where it is a sphere or a plane: both turned to the viewer. ``position`` (n, 3) lies ``lift`` above the surface, and
-    ``wo`` (n, 3) is the way back in the frame of the normal. Where a shading normal turns away from the viewer the
-    geometric one takes its place.
+    ``slots`` (n,) of the rays; ``material_of`` and ``gathers`` are told for each thing that can be met. Points lie
+    ``lift`` above the surface. Where a shading normal turns away from the viewer the geometric one takes its place.
     """
-    for m in prange(len(origins)):
-        o, d, t = origins[m], directions[m], distance[m]
-        for c in range(3):
-            position[m, c] = o[c] + t * d[c]
-        if which[m] < len(spheres):
-            s = spheres[which[m]]
-            for c in range(3):
-                faces[m, c] = (position[m, c] - s[c]) / s[3]
-                normal[m, c] = faces[m, c]
-        elif which[m] < len(spheres) + len(planes):
-            for c in range(3):
-                faces[m, c] = normal[m, c] = 1.0 if c == 2 else 0.0
-        turned = -(d[0] * faces[m, 0] + d[1] * faces[m, 1] + d[2] * faces[m, 2])
-        leaning = -(d[0] * normal[m, 0] + d[1] * normal[m, 1] + d[2] * normal[m, 2])
-        sign = -1.0 if turned < 0 else 1.0
-        shaded = sign * leaning > 0
-        for c in range(3):
-            faces[m, c] *= sign
-            normal[m, c] = sign * normal[m, c] if shaded else faces[m, c]
-            position[m, c] += lift * faces[m, c]
-        x, y, z = to_local(normal[m], -d[0], -d[1], -d[2])
+    starts = np.zeros(materials + 1, dtype=np.intp)
+    for m in range(len(wanted)):
+        if wanted[m]:
+            starts[material_of[which[m]] + 1] += 1
+    for k in range(materials):
+        starts[k + 1] += starts[k]
+    count, places = starts[materials], starts[:-1].copy()
+    parents, of_slots, gather = np.empty(count, np.intp), np.empty(count, np.intp), np.empty(count, np.bool_)
+    position, normal, faces, wo = np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3))
+    for m in range(len(wanted)):
+        if not wanted[m]:
+            continue
+        thing = which[m]
+        n = places[material_of[thing]]
+        places[material_of[thing]] = n + 1
+        parents[n], of_slots[n], gather[n] = m, slots[m], gathers[thing]
+        dx, dy, dz, t = directions[m, 0], directions[m, 1], directions[m, 2], distance[m]
+        px, py, pz = origins[m, 0] + t * dx, origins[m, 1] + t * dy, origins[m, 2] + t * dz
+        fx, fy, fz = 0.0, 0.0, 1.0
+        nx, ny, nz = fx, fy, fz
+        if thing < len(spheres):
+            cx, cy, cz, radius = spheres[thing, 0], spheres[thing, 1], spheres[thing, 2], spheres[thing, 3]
+            fx, fy, fz = px - cx, py - cy, pz - cz
+            length = math.sqrt(fx * fx + fy * fy + fz * fz)
+            fx, fy, fz = fx / length, fy / length, fz / length
+            nx, ny, nz = fx, fy, fz
+            # On the sphere again: seen from afar, a small one would be missed by the rounding of the way.
+            px, py, pz = cx + radius * fx, cy + radius * fy, cz + radius * fz
+        elif thing >= len(spheres) + len(planes):
+            fx, fy, fz = mesh_faces[m, 0], mesh_faces[m, 1], mesh_faces[m, 2]
+            nx, ny, nz = mesh_normals[m, 0], mesh_normals[m, 1], mesh_normals[m, 2]
+        if dx * fx + dy * fy + dz * fz > 0:
+            fx, fy, fz = -fx, -fy, -fz
+            nx, ny, nz = -nx, -ny, -nz
+        if not dx * nx + dy * ny + dz * nz < 0:
+            nx, ny, nz = fx, fy, fz
+        faces[n, 0], faces[n, 1], faces[n, 2] = fx, fy, fz
+        normal[n, 0], normal[n, 1], normal[n, 2] = nx, ny, nz
+        position[n, 0], position[n, 1], position[n, 2] = px + lift * fx, py + lift * fy, pz + lift * fz
+        x, y, z = to_local(nx, ny, nz, -dx, -dy, -dz)
         # Rounding must not put the viewer of a grazed surface below its horizon.
-        wo[m, 0], wo[m, 1], wo[m, 2] = x, y, max(0.0, z)
+        wo[n, 0], wo[n, 1], wo[n, 2] = x, y, max(0.0, z)
+    return parents, of_slots, position, normal, faces, wo, gather, starts
+
+
+@inlined_kernel
+def seen(normal: Array, faces: Array, n: int, x: float, y: float, z: float) -> bool:
+    """Return whether a direction lies above both the horizon of shading normal n (., 3) and that of the surface."""
+    above = normal[n, 0] * x + normal[n, 1] * y + normal[n, 2] * z > 0
+    return bool(above and faces[n, 0] * x + faces[n, 1] * y + faces[n, 2] * z > 0)
 
 
 @kernel
-def seen(n: Array, face: Array, x: float, y: float, z: float) -> bool:
-    """Return whether a direction lies above both the horizon of the shading normal and that of the surface."""
-    return bool(n[0] * x + n[1] * y + n[2] * z > 0 and face[0] * x + face[1] * y + face[2] * z > 0)
-
-
-@parallel_kernel
-def onwards(normal: Array, faces: Array, wi: Array, pdf: Array, directions: Array) -> None:
-    """Write drawn directions ``wi`` (n, 3) in the world; ``pdf`` (n,) becomes 0 where they lead into the surface."""
-    for m in prange(len(wi)):
-        x, y, z = to_world(normal[m], wi[m, 0], wi[m, 1], wi[m, 2])
-        directions[m, 0], directions[m, 1], directions[m, 2] = x, y, z
-        if not (wi[m, 2] > 0 and seen(normal[m], faces[m], x, y, z)):
-            pdf[m] = 0.0
-
-
-@parallel_kernel
-def to_sky(normal: Array, faces: Array, directions: Array, wi: Array, radiance: Array, distance: Array) -> None:
-    """Write the same as ``to_sun`` for ``directions`` that were drawn from the sky, whose ``radiance`` is given."""
-    for m in prange(len(normal)):
-        x, y, z = directions[m, 0], directions[m, 1], directions[m, 2]
-        r = radiance[m]
-        arrive(normal[m], faces[m], x, y, z, r[0], r[1], r[2], m, directions, wi, radiance)
-        distance[m] = math.inf
-
-
-@parallel_kernel
-def to_sun(
-    sun: Array, normal: Array, faces: Array, directions: Array, wi: Array, radiance: Array, distance: Array
-) -> None:
-    """Write the way (n, 3) to the ``sun``: direction, irradiance (6,); what it would light (n, 3), cosine included."""
-    for m in prange(len(normal)):
-        arrive(normal[m], faces[m], sun[0], sun[1], sun[2], sun[3], sun[4], sun[5], m, directions, wi, radiance)
-        distance[m] = math.inf
-
-
-@parallel_kernel
-def to_point(
-    lamp: Array,
+def onwards(
     position: Array,
     normal: Array,
     faces: Array,
-    directions: Array,
     wi: Array,
-    radiance: Array,
-    distance: Array,
-) -> None:
-    """Write the same for a point ``lamp``: position, intensity (6,)."""
-    for m in prange(len(normal)):
-        x, y, z = lamp[0] - position[m, 0], lamp[1] - position[m, 1], lamp[2] - position[m, 2]
-        d2 = max(x * x + y * y + z * z, 1e-300)
-        d = math.sqrt(d2)
-        arrive(
-            normal[m],
-            faces[m],
-            x / d,
-            y / d,
-            z / d,
-            lamp[3] / d2,
-            lamp[4] / d2,
-            lamp[5] / d2,
-            m,
-            directions,
-            wi,
-            radiance,
-        )
-        distance[m] = d
-
-
-@parallel_kernel
-def to_rectangle(
-    cut: Cut,
-    slots: Array,
-    pair: int,
-    rectangle: Array,
-    glow: Array,
-    position: Array,
-    normal: Array,
-    faces: Array,
-    directions: Array,
-    wi: Array,
-    radiance: Array,
-    distance: Array,
     pdf: Array,
-) -> None:
-    """Write the same for a random place on a ``rectangle`` (12,) of radiance ``glow`` (3,), and its density ``pdf``."""
-    r = rectangle
-    area = 4.0 * math.sqrt((r[3] * r[3] + r[4] * r[4] + r[5] * r[5]) * (r[6] * r[6] + r[7] * r[7] + r[8] * r[8]))
-    for m in prange(len(normal)):
-        u, v = number(cut, slots[m], pair)
-        u, v = 2.0 * u - 1.0, 2.0 * v - 1.0
-        x = r[0] + u * r[3] + v * r[6] - position[m, 0]
-        y = r[1] + u * r[4] + v * r[7] - position[m, 1]
-        z = r[2] + u * r[5] + v * r[8] - position[m, 2]
-        d2 = max(x * x + y * y + z * z, 1e-300)
-        d = math.sqrt(d2)
-        x, y, z = x / d, y / d, z / d
-        facing = -(x * r[9] + y * r[10] + z * r[11])
-        lit = 1.0 if facing > 0 else 0.0
-        arrive(normal[m], faces[m], x, y, z, lit * glow[0], lit * glow[1], lit * glow[2], m, directions, wi, radiance)
-        distance[m] = d
-        pdf[m] = d2 / (area * facing) if facing > 0 else math.inf
+    spheres: Array,
+    planes: Array,
+    rectangles: Array,
+) -> tuple[Array, Array, Array]:
+    """Return Rays, but for their origins, along drawn directions ``wi`` (n, 3).
+
+    ``pdf`` (n,) becomes 0 where they lead into the surface.
+    """
+    p = position
+    directions, distance, which = np.empty((len(pdf), 3)), np.empty(len(pdf)), np.empty(len(pdf), np.intp)
+    for n in range(len(pdf)):
+        x, y, z = to_world(normal[n, 0], normal[n, 1], normal[n, 2], wi[n, 0], wi[n, 1], wi[n, 2])
+        directions[n, 0], directions[n, 1], directions[n, 2] = x, y, z
+        if pdf[n] > 0 and wi[n, 2] > 0 and seen(normal, faces, n, x, y, z):
+            distance[n], which[n] = first_met(p[n, 0], p[n, 1], p[n, 2], x, y, z, NEVER, spheres, planes, rectangles)
+        else:
+            pdf[n], distance[n], which[n] = 0.0, NEVER, -1
+    return directions, distance, which
 
 
-@kernel
-def arrive(
-    n: Array,
-    face: Array,
+@inlined_kernel
+def arriving(
+    which: int,
+    distance: float,
     x: float,
     y: float,
     z: float,
-    red: float,
-    green: float,
-    blue: float,
-    m: int,
-    directions: Array,
-    wi: Array,
+    texels: Array,
     radiance: Array,
-) -> None:
-    """Write a direction in the world and in the frame of ``n``, and its light times the cosine, 0 below a horizon."""
-    directions[m, 0], directions[m, 1], directions[m, 2] = x, y, z
-    a, b, c = to_local(n, x, y, z)
-    wi[m, 0], wi[m, 1], wi[m, 2] = a, b, c
-    cosine = c if seen(n, face, x, y, z) else 0.0
-    radiance[m, 0], radiance[m, 1], radiance[m, 2] = red * cosine, green * cosine, blue * cosine
-
-
-@parallel_kernel
-def glowing(
-    directions: Array, distance: Array, lamp: Array, rectangles: Array, glows: Array, radiance: Array, pdf: Array
-) -> None:
-    """Write the radiance (n, 3) of the lamps (n,) that rays meet, and with what density (n,) they would be drawn.
-
-    ``rectangles`` (K, 12), ``glows`` (K, 3); the back of a lamp is black.
-    """
-    for m in prange(len(directions)):
-        r, glow = rectangles[lamp[m]], glows[lamp[m]]
-        facing = -(directions[m, 0] * r[9] + directions[m, 1] * r[10] + directions[m, 2] * r[11])
+    rectangles: Array,
+    sky_scale: float,
+    first_lamp: int,
+) -> tuple[float, float, float, float]:
+    """Return the radiance of what shines at the end of a ray, and with what density it is sampled as a light, or 0."""
+    if which < 0:
+        if len(texels) == 0:
+            return 0.0, 0.0, 0.0, 0.0
+        red, green, blue = look_up(texels, x, y, z)
+        return red, green, blue, pdf_of(texels, sky_scale, x, y, z) if sky_scale > 0 else 0.0
+    k = which - first_lamp
+    if 0 <= k < len(radiance):
+        facing = -(x * rectangles[k, 9] + y * rectangles[k, 10] + z * rectangles[k, 11])
+        # The back of a lamp is black.
         if facing > 0:
-            area = 4.0 * math.sqrt(
-                (r[3] * r[3] + r[4] * r[4] + r[5] * r[5]) * (r[6] * r[6] + r[7] * r[7] + r[8] * r[8])
-            )
-            radiance[m, 0], radiance[m, 1], radiance[m, 2] = glow[0], glow[1], glow[2]
-            pdf[m] = distance[m] * distance[m] / (area * facing)
-        else:
-            radiance[m, 0], radiance[m, 1], radiance[m, 2] = 0.0, 0.0, 0.0
-            pdf[m] = 0.0
+            pdf = distance * distance / (rectangle_area(rectangles, k) * facing)
+            return radiance[k, 0], radiance[k, 1], radiance[k, 2], pdf
+    return 0.0, 0.0, 0.0, 0.0
 
 
 @kernel
-def shining(radiance: Array) -> Array:
-    """Return the rows of ``radiance`` (n, 3) that are not black."""
-    rows, count = np.empty(len(radiance), dtype=np.intp), 0
-    for m in range(len(radiance)):
-        if radiance[m, 0] > 0 or radiance[m, 1] > 0 or radiance[m, 2] > 0:
-            rows[count] = m
-            count += 1
-    return rows[:count].copy()
+def background(
+    directions: Array,
+    distance: Array,
+    which: Array,
+    texels: Array,
+    radiance: Array,
+    rectangles: Array,
+    sky_scale: float,
+    first_lamp: int,
+) -> Array:
+    """Return the radiance (m, 3) that rays find without any material."""
+    d = directions
+    out = np.empty((len(which), 3))
+    for m in range(len(which)):
+        out[m, 0], out[m, 1], out[m, 2], _ = arriving(
+            which[m], distance[m], d[m, 0], d[m, 1], d[m, 2], texels, radiance, rectangles, sky_scale, first_lamp
+        )
+    return out
+
+
+@kernel
+def look_ups(
+    wo: Array,
+    wi: Array,
+    pdf: Array,
+    goes_on: Array,
+    lit_wi: Array,
+    lit_light: Array,
+    directions: Array,
+    distance: Array,
+    which: Array,
+    texels: Array,
+    radiance: Array,
+    rectangles: Array,
+    sky_scale: float,
+    first_lamp: int,
+    counted: int,
+) -> tuple[Array, Array, Array, Array, Array]:
+    """Return what is looked up at vertices that are seen from ``wo`` (n, 3): which one (k,), wi, wo, light (k, 3).
+
+    That is, vertex by vertex, the drawn direction ``wi`` (n, 3), where light arrives along its ray, counted as said, or
+    where the path ``goes_on`` (n,); and directions to lamps (n, L, 3) with their light (n, L, 3) where that is not
+    black. Last, which look-up the drawn direction of each vertex is (n,), or -1.
+    """
+    d, lamps = directions, lit_wi.shape[1]
+    most = len(pdf) * (1 + lamps)
+    at, number = np.empty(most, np.intp), np.empty(len(pdf), np.intp)
+    out_wi, out_wo, light = np.empty((most, 3)), np.empty((most, 3)), np.empty((most, 3))
+    k = 0
+    for n in range(len(pdf)):
+        number[n] = -1
+        if pdf[n] > 0:
+            red, green, blue, light_pdf = arriving(
+                which[n], distance[n], d[n, 0], d[n, 1], d[n, 2], texels, radiance, rectangles, sky_scale, first_lamp
+            )
+            share = wi[n, 2] / pdf[n]
+            if counted == BALANCED:
+                share *= pdf[n] / (pdf[n] + light_pdf)
+            elif counted == ONLY_UNSAMPLED and light_pdf > 0:
+                share = 0.0
+            red, green, blue = share * red, share * green, share * blue
+            if goes_on[n] or red > 0 or green > 0 or blue > 0:
+                number[n], at[k] = k, n
+                light[k, 0], light[k, 1], light[k, 2] = red, green, blue
+                for c in range(3):
+                    out_wi[k, c], out_wo[k, c] = wi[n, c], wo[n, c]
+                k += 1
+        for j in range(lamps):
+            if lit_light[n, j, 0] > 0 or lit_light[n, j, 1] > 0 or lit_light[n, j, 2] > 0:
+                at[k] = n
+                for c in range(3):
+                    light[k, c], out_wi[k, c], out_wo[k, c] = lit_light[n, j, c], lit_wi[n, j, c], wo[n, c]
+                k += 1
+    return at[:k].copy(), out_wi[:k].copy(), out_wo[:k].copy(), light[:k].copy(), number
 
 
 @kernel

@@ -19,17 +19,17 @@ from bvbedit.render.integrator import (
     checked_integer,
     checked_models,
     checked_picture,
+    waves_of,
 )
 from bvbedit.render.scene import Scene
 from bvbedit.render.scene_file import scene_of
 from bvbedit.render.shading import Reflectance, levels_lit, shade
 from bvbedit.render.stage import make_stage
-from bvbedit.render.trace import Level, trace
+from bvbedit.render.trace import Level, Wave, trace
+from bvbedit.threads import in_turn
 
 # Paths that are kept, each some 500 bytes.
 MOST_PATHS = 1 << 24
-# Paths of a wave: few large ones, so that materials are asked for many directions at once.
-WAVE = 1 << 18
 
 
 @dataclass(frozen=True)
@@ -79,11 +79,12 @@ class PreparedScene:
         self._models = len(checked_models(model))
         self._stage = make_stage(scene_of(scene), checked_models(model), checked_densities(density))
         self.shape, self.spp = (height, width), spp
-        each, pixels = max(1, WAVE // spp), width * height
-        self._waves = [
-            trace(self._stage, (first, 0, spp, np.uint64(seed)), min(each, pixels - first) * spp, self.shape)
-            for first in range(0, pixels, each)
-        ]
+
+        def traced(wave: tuple[int, int]) -> Wave:
+            first, pixels = wave
+            return trace(self._stage, (first, 0, spp, np.uint64(seed)), pixels * spp, self.shape)
+
+        self._waves = list(in_turn(traced, waves_of(self.shape, spp)))
         # What the scene itself is made of does not change.
         self._known = {
             (id(level), number): _asked(self._stage.materials[number], level, part)
@@ -126,8 +127,11 @@ class PreparedScene:
         if len(models) != self._models:
             raise BvbError(f"{len(models)} models given, {self._models} prepared for. Give as many.")
         reflectance = self._reflectance(models)
-        seen = [shade(wave, reflectance).reshape(-1, self.spp, 3).mean(axis=1) for wave in self._waves]
-        return checked_picture(np.concatenate(seen)).reshape(*self.shape, 3)
+
+        def seen(wave: Wave) -> NDArray[np.float64]:
+            return np.asarray(shade(wave, reflectance).reshape(-1, self.spp, 3).mean(axis=1))
+
+        return checked_picture(np.concatenate(list(in_turn(seen, self._waves)))).reshape(*self.shape, 3)
 
     def _reflectance(self, models: Sequence[Brdf]) -> Reflectance:
         stage = self._stage.with_models(models)

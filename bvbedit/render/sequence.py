@@ -9,7 +9,7 @@ hash with Vegdahl's constants); splitmix64, Steele et al. 2014.
 
 import numpy as np
 
-from bvbedit.jit import kernel
+from bvbedit.jit import inlined_kernel
 
 U = np.uint64
 WORD = U(0xFFFFFFFF)
@@ -22,7 +22,7 @@ SHIFT30, SHIFT27, SHIFT31, SHIFT32 = U(30), U(27), U(31), U(32)
 TO_UNIT = 2.0**-32
 
 
-@kernel
+@inlined_kernel
 def mix(state: U, counter: U) -> U:
     """Hash a state and a counter into 64 well-mixed bits (splitmix64)."""
     z = state + (counter + ONE) * GOLDEN
@@ -31,7 +31,7 @@ def mix(state: U, counter: U) -> U:
     return z ^ (z >> SHIFT31)
 
 
-@kernel
+@inlined_kernel
 def reverse(x: U) -> U:
     """Reverse the order of 32 bits."""
     x = ((x >> ONE) & LOW1) | ((x & LOW1) << ONE)
@@ -41,7 +41,7 @@ def reverse(x: U) -> U:
     return (x >> SIXTEEN) | ((x & LOW16) << SIXTEEN)
 
 
-@kernel
+@inlined_kernel
 def scramble(x: U, seed: U) -> U:
     """Owen-scramble a word whose bits are reversed: each bit is flipped by a hash of the bits below it."""
     x = (x + seed) & WORD
@@ -52,7 +52,7 @@ def scramble(x: U, seed: U) -> U:
     return x
 
 
-@kernel
+@inlined_kernel
 def point(state: U, sample: int, pair: int) -> tuple[float, float]:
     """Return point ``sample`` in [0, 1)^2 of the sequence with hashed ``state``; each ``pair`` is its own sequence.
 

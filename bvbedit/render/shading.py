@@ -5,8 +5,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from bvbedit.render import kernels
-from bvbedit.render.rays import Floats
-from bvbedit.render.trace import Level, Wave
+from bvbedit.render.trace import Floats, Level, Wave
 
 # What a material, by its number, reflects (k, 3) along the look-ups of one level.
 Reflectance = Callable[[Level, int, slice], Floats]

@@ -13,6 +13,7 @@ from bvbedit.brdf.density import Density
 from bvbedit.brdf.materials import MATERIALS
 from bvbedit.errors import BvbError
 from bvbedit.io import load
+from bvbedit.render.arrays import Glow, Lamps, Shapes
 from bvbedit.render.embree import CLEARANCE, Tracer
 from bvbedit.render.environment import EnvironmentDensity
 from bvbedit.render.lights import PointLight, RectangleLight, Sun
@@ -23,6 +24,9 @@ Floats = NDArray[np.float64]
 
 # An environment is sampled as a light where it is so uneven: materials find what is evenly bright by themselves.
 WORTH_SAMPLING = 2.0
+# What stands for a black environment: read-only as others are, for to numba a writable array is another type.
+BLACK = np.frombuffer(b"", dtype=np.float32).reshape(0, 0, 3)
+NOTHING = np.frombuffer(b"", dtype=np.float64), np.frombuffer(b"", dtype=np.float64).reshape(0, 0)
 
 
 @dataclass(frozen=True)
@@ -62,6 +66,32 @@ class Stage:
     def lights(self) -> int:
         """How many lights are sampled."""
         return len(self.suns) + len(self.points) + len(self.rectangles) + self.sky_sampled
+
+    @cached_property
+    def shapes(self) -> Shapes:
+        """What rays meet besides meshes."""
+        return Shapes(self.spheres, self.planes, self.rectangles)
+
+    @cached_property
+    def glow(self) -> Glow:
+        """What shines where rays end."""
+        return Glow(BLACK if self.sky is None else self.sky.texels, self.glows, self.rectangles)
+
+    @cached_property
+    def lamps(self) -> Lamps:
+        """What is sampled as a light."""
+        sky = (BLACK, *NOTHING) if self.sky is None else (self.sky.texels, self.sky.rows, self.sky.columns)
+        return Lamps(self.suns, self.points, self.rectangles, self.glows, *sky)
+
+    @property
+    def sky_scale(self) -> float:
+        """What turns the sky's radiance into the density by which it is sampled; 0 if it is not."""
+        return self.sky.scale if self.sky is not None and self.sky_sampled else 0.0
+
+    @property
+    def first_lamp(self) -> int:
+        """The number of the first rectangle."""
+        return len(self.spheres) + len(self.planes)
 
     def with_models(self, models: Sequence[Brdf]) -> "Stage":
         """Return the stage with other models; light is still drawn by the densities of the former ones."""

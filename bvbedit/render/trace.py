@@ -6,25 +6,32 @@ of directions and the light that arrives along them. The same look-ups serve any
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bvbedit.brdf.density import Density
-from bvbedit.render import kernels
-from bvbedit.render.light_sampling import Found, Points, look_for_light
-from bvbedit.render.rays import Ends, Floats, Places, arriving, follow, on_surface
+from bvbedit.render import kernels, lamp_kernels
+from bvbedit.render.arrays import Draws, Lit, Normals, Rays, Vertices
 from bvbedit.render.stage import Stage
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+Places = NDArray[np.intp]
+# The vertices of each material: its number, and which they are.
+Groups = tuple[tuple[int, slice], ...]
 
 # How direct light is found: by the material's density, by sampling lights, or by both, each where it is better. A lamp
 # without size is always sampled.
 Strategy = Literal["both", "density", "lights"]
+COUNTED = {"both": kernels.BALANCED, "density": kernels.ALL, "lights": kernels.ONLY_UNSAMPLED}
 
 
 @dataclass(frozen=True)
 class Level:
-    """What is asked of the materials where paths meet their n-th surface; look-ups are sorted by material."""
+    """What is asked of the materials where paths meet their n-th surface; paths and look-ups are sorted by material."""
 
     parents: Places
     """(n,): the path of the level before, or at the first surface the slot, that led here."""
@@ -40,7 +47,7 @@ class Level:
     """(c,): the look-ups that lead to deeper surfaces, in the order of the paths there."""
     share: Floats
     """(c,): by what the radiance of these is multiplied."""
-    groups: tuple[tuple[int, slice], ...]
+    groups: Groups
     """For each material its number and its look-ups."""
 
 
@@ -53,137 +60,96 @@ class Wave:
     levels: tuple[Level, ...]
 
 
-@dataclass(frozen=True)
-class _Rays:
-    """Rays (n, 3), (n, 3) that end on surfaces, the slots (n,) that they serve, and what they started from (n,)."""
-
-    parents: Places
-    slots: Places
-    origins: Floats
-    directions: Floats
-    ends: Ends
-
-
 def trace(stage: Stage, cut: kernels.Cut, slots: int, shape: tuple[int, int], strategy: Strategy = "both") -> Wave:
     """Return the wave of so many ``slots`` of a picture of ``shape`` (h, w)."""
-    origins, directions = np.empty((slots, 3)), np.empty((slots, 3))
-    kernels.camera_rays(cut, shape, stage.camera_array, origins, directions)
-    ends = follow(stage, origins, directions)
-    background, _ = arriving(stage, directions, ends)
-    met = np.flatnonzero(on_surface(stage, ends))
-    rays = _Rays(met, met, origins.take(met, axis=0), directions.take(met, axis=0), ends.taken(met))
+    draws = Draws(np.empty(slots, np.uint64), np.empty(slots, np.intp))
+    rays = Rays(np.empty((slots, 3)), np.empty((slots, 3)), np.empty(slots), np.empty(slots, np.intp))
+    kernels.camera_rays(cut, shape, stage.camera_array, *stage.shapes, *draws, *rays)
+    everywhere = np.ones(slots, dtype=bool)
+    normals = _meshes_met(stage, rays, everywhere)
+    background = kernels.background(*rays[1:], *stage.glow, stage.sky_scale, stage.first_lamp)
+    vertices, groups = _met(stage, rays, np.arange(slots), _on_surface(stage, rays), normals)
     levels = []
     for depth in range(stage.depth):
-        if len(rays.slots):
-            level, rays = _level(stage, cut, depth, strategy, rays)
+        if len(vertices.slots):
+            level, vertices, groups = _level(stage, draws, depth, strategy, vertices, groups)
             levels.append(level)
     return Wave(background, tuple(levels))
 
 
-def _level(stage: Stage, cut: kernels.Cut, depth: int, strategy: Strategy, rays: _Rays) -> tuple[Level, _Rays]:
-    """Return what is asked where ``rays`` end, and the rays that go on from there to other surfaces."""
-    points = _points(stage, rays)
+def _level(
+    stage: Stage, draws: Draws, depth: int, strategy: Strategy, vertices: Vertices, groups: Groups
+) -> tuple[Level, Vertices, Groups]:
+    """Return what is asked at ``vertices``, and the vertices where paths go on from there."""
     first_pair = 1 + depth * (1 + stage.lights)
+    numbers = kernels.numbers(*draws, vertices.slots, first_pair)
+    drawn = [stage.densities[m].sample(vertices.wo[part], numbers[part]) for m, part in groups]
+    wi, pdf = (np.concatenate(parts) if len(parts) > 1 else parts[0] for parts in zip(*drawn, strict=True))
+    frame = vertices.position, vertices.normal, vertices.faces
+    rays = Rays(vertices.position, *kernels.onwards(*frame, wi, pdf, *stage.shapes))
+    normals = _meshes_met(stage, rays, pdf > 0)
+    goes_on = _on_surface(stage, rays) & vertices.gathers & (pdf > 0) & (depth + 1 < stage.depth)
 
-    # The directions that the materials' densities draw, and what shines there.
-    numbers = np.empty((len(points.slots), 2))
-    kernels.numbers(cut, points.slots, first_pair, numbers)
-    wi, pdf = _drawn(stage, points, numbers)
-    directions = np.empty_like(wi)
-    kernels.onwards(points.normal, points.faces, wi, pdf, directions)
-    at = np.flatnonzero(pdf > 0)
-    origins, directions = points.position.take(at, axis=0), directions.take(at, axis=0)
-    ends = follow(stage, origins, directions)
-    radiance, light_pdf = arriving(stage, directions, ends)
-    if strategy == "both":
-        radiance *= (pdf[at] / (pdf[at] + light_pdf))[:, None]
-    elif strategy == "lights":
-        radiance[light_pdf > 0] = 0.0
-    goes_on = on_surface(stage, ends) & points.gathers[at] & (depth + 1 < stage.depth)
-    useful = goes_on.copy()
-    useful[kernels.shining(radiance)] = True
-    used = np.flatnonzero(useful)
-    drawn = wi.take(at[used], axis=0)
-    share = drawn[:, 2] / pdf[at[used]]
-    followed = np.flatnonzero(goes_on[used])
-    found = [(at[used], drawn, radiance.take(used, axis=0) * share[:, None])]
-
-    # The directions of the lights.
-    for lit in look_for_light(stage, cut, first_pair + 1, points):
-        if lit.pdf is None:
-            found.append((lit.at, lit.wi, lit.light))
-        elif strategy != "density":
-            density = lit.pdf + (_pdf(stage, points, lit) if strategy == "both" else 0.0)
-            found.append((lit.at, lit.wi, lit.light / density[:, None]))
-
-    level = _sorted(points, rays.parents, found, followed, share[followed])
-    on = used[followed]
-    onward = origins.take(on, axis=0), directions.take(on, axis=0), ends.taken(on)
-    return level, _Rays(at[on], points.slots[at[on]], *onward)
-
-
-def _points(stage: Stage, rays: _Rays) -> Points:
-    position, wo, ends = np.empty_like(rays.origins), np.empty_like(rays.origins), rays.ends
-    kernels.surfaces(
-        rays.origins,
-        rays.directions,
-        ends.distance,
-        ends.which,
-        stage.spheres,
-        stage.planes,
-        stage.lift,
-        ends.faces,
-        ends.normal,
-        position,
-        wo,
+    lit = _lit(stage, draws, first_pair + 1, strategy, vertices, groups)
+    shines = stage.sky_scale, stage.first_lamp, COUNTED[strategy]
+    at, asked_wi, asked_wo, light, number = kernels.look_ups(
+        vertices.wo, wi, pdf, goes_on, lit.wi, lit.light, *rays[1:], *stage.glow, *shines
     )
-    return Points(
-        rays.slots, position, ends.normal, ends.faces, wo, stage.material_of[ends.which], stage.gathers[ends.which]
+    deeper, deeper_groups = _met(stage, rays, vertices.slots, goes_on, normals)
+    share = wi[deeper.parents, 2] / pdf[deeper.parents]
+    edges = np.searchsorted(at, [part.start for _, part in groups]).tolist()
+    look_ups_of = [slice(a, b) for a, b in zip(edges, [*edges[1:], len(at)], strict=True)]
+    numbered = tuple((m, part) for (m, _), part in zip(groups, look_ups_of, strict=True))
+    asked = asked_wi, asked_wo, light
+    return Level(vertices.parents, at, *asked, number[deeper.parents], share, numbered), deeper, deeper_groups
+
+
+def _lit(stage: Stage, draws: Draws, first_pair: int, strategy: Strategy, vertices: Vertices, groups: Groups) -> Lit:
+    """Return what the lamps send to the vertices, over the density with which their directions are found."""
+    at = vertices.slots, vertices.position, vertices.normal, vertices.faces
+    sized = strategy != "density"
+    lit = Lit(
+        *lamp_kernels.light_of_lamps(*at, *draws, *stage.lamps, *stage.shapes, first_pair, stage.sky_scale, sized)
     )
+    if stage.meshes is not None:
+        n, j = np.nonzero(lit.light.any(axis=2))
+        hidden = stage.meshes.blocked(vertices.position[n], lit.directions[n, j], lit.distance[n, j])
+        lit.light[n[hidden], j[hidden]] = 0.0
+    sizeless = len(stage.suns) + len(stage.points)
+    if stage.lights > sizeless:
+        if strategy == "both":
+            for m, part in groups:
+                density: Density = stage.densities[m]
+                n, j = np.nonzero(lit.light[part, sizeless:].any(axis=2))
+                n, j = n + part.start, j + sizeless
+                lit.pdf[n, j] += density.pdf(lit.wi[n, j], vertices.wo[n])
+        lit.light[:, sizeless:] /= np.maximum(lit.pdf[:, sizeless:, None], np.finfo(float).tiny)
+    return lit
 
 
-def _drawn(stage: Stage, points: Points, numbers: Floats) -> tuple[Floats, Floats]:
-    """Return directions (n, 3) in the frame, drawn by the densities of the materials, and these (n,)."""
-    present = _present(points.material)
-    if len(present) == 1:
-        only: Density = stage.densities[present[0]]
-        return only.sample(points.wo, numbers)
-    wi, pdf = np.empty_like(points.wo), np.empty(len(points.wo))
-    for m in present:
-        rows = np.flatnonzero(points.material == m)
-        wi[rows], pdf[rows] = stage.densities[m].sample(points.wo.take(rows, axis=0), numbers.take(rows, axis=0))
-    return wi, pdf
+def _on_surface(stage: Stage, rays: Rays) -> Bools:
+    """Return which rays (n,) end on a surface that has a material."""
+    # The number of what is not met is the last one, and is not looked at.
+    return np.asarray((rays.which >= 0) & (stage.material_of[rays.which] >= 0))
 
 
-def _pdf(stage: Stage, points: Points, lit: Found) -> Floats:
-    """Return with what density (k,) the materials would have drawn the directions of a light."""
-    material, wo = points.material[lit.at], points.wo.take(lit.at, axis=0)
-    out = np.empty(len(lit.at))
-    for m in _present(material):
-        rows = np.flatnonzero(material == m)
-        out[rows] = stage.densities[m].pdf(lit.wi[rows], wo[rows])
+def _meshes_met(stage: Stage, rays: Rays, sent: Bools) -> Normals:
+    """Let those of the ``rays`` that are ``sent`` (n,) end at meshes, and return the normals where they do."""
+    if stage.meshes is None:
+        return Normals(np.empty((0, 3)), np.empty((0, 3)))
+    rows = np.flatnonzero(sent)
+    t, mesh, faces, shading = stage.meshes.nearest(rays.origins[rows], rays.directions[rows])
+    closer = t < rays.distance[rows]
+    met, out = rows[closer], Normals(np.empty((len(sent), 3)), np.empty((len(sent), 3)))
+    rays.distance[met], rays.which[met] = t[closer], len(stage.material_of) - stage.meshes.count + mesh[closer]
+    out.faces[met], out.shading[met] = faces[closer], shading[closer]
     return out
 
 
-def _sorted(
-    points: Points, parents: Places, found: list[tuple[Places, Floats, Floats]], followed: Places, share: Floats
-) -> Level:
-    """Return a level of the look-ups ``found``, of which the first may be ``followed``, sorted by material."""
-    at, wi, light = (np.concatenate(parts) for parts in zip(*found, strict=True))
-    material = points.material[at]
-    present = _present(material)
-    if len(present) > 1:
-        order = np.argsort(material, kind="stable")
-        at, material = at[order], material[order]
-        wi, light = wi.take(order, axis=0), light.take(order, axis=0)
-        places = np.empty_like(order)
-        places[order] = np.arange(len(order))
-        followed = places[followed]
-    edges = [*np.searchsorted(material, present), len(material)]
-    groups = tuple((int(m), slice(int(a), int(b))) for m, a, b in zip(present, edges[:-1], edges[1:], strict=True))
-    return Level(parents, at, wi, points.wo.take(at, axis=0), light, followed, share, groups)
-
-
-def _present(material: NDArray[np.int16]) -> Places:
-    """Return the numbers of the materials, in order."""
-    return np.flatnonzero(np.bincount(material))
+def _met(stage: Stage, rays: Rays, slots: Places, wanted: Bools, normals: Normals) -> tuple[Vertices, Groups]:
+    """Return the vertices where those rays end that are ``wanted`` (n,), and those of each material."""
+    materials = len(stage.materials)
+    ends = *rays, slots, wanted, *normals, stage.spheres, stage.planes
+    *found, starts = kernels.meet(*ends, stage.material_of, stage.gathers, materials, stage.lift)
+    parts = [slice(int(a), int(b)) for a, b in pairwise(starts)]
+    return Vertices(*found), tuple((m, part) for m, part in enumerate(parts) if part.start < part.stop)

@@ -4,7 +4,7 @@ import numpy as np
 from numba import prange
 from numpy.typing import NDArray
 
-from bvbedit.jit import kernel, parallel_kernel
+from bvbedit.jit import inlined_kernel, kernel, parallel_kernel
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -177,7 +177,7 @@ def weighted_normal(first: Indices, rows: Floats, weights: Floats, x: Floats, ou
             band_column(rows[i], line, out_piece[first[i] : first[i] + k])
 
 
-@kernel
+@inlined_kernel
 def locate(x: float, knots: Floats, bins: Indices, scale: float, last: int) -> int:
     """Return the span of ``x`` by way of ``bins``, the spans at the left ends of equal bins of width 1/scale."""
     span = bins[min(int((x - knots[0]) * scale), len(bins) - 1)]
@@ -186,6 +186,13 @@ def locate(x: float, knots: Floats, bins: Indices, scale: float, last: int) -> i
     while x < knots[span]:  # rounding put x one bin too far
         span -= 1
     return int(span)
+
+
+@inlined_kernel
+def cubic(polynomials: Floats, span: int, i: int, t: float) -> float:
+    """Return basis function i of a span at the local parameter ``t`` in [0, 1], by its powers (spans, 4, 4)."""
+    high = polynomials[span, i, 2] + t * polynomials[span, i, 3]
+    return float(polynomials[span, i, 0] + t * (polynomials[span, i, 1] + t * high))
 
 
 @parallel_kernel
@@ -225,11 +232,9 @@ def evaluate_cubic_rgb(
         a = b = c = d = e = f = g = h = i = j = k = l = 0.0  # noqa: E741
         corner = np.uint64(s0 - 3) * plane + np.uint64(s1 - 3) * row + np.uint64(3 * (s2 - 3))
         for u in range(4):
-            p = polynomials_0[s0, u]
-            wu = p[0] + t0 * (p[1] + t0 * (p[2] + t0 * p[3]))
+            wu = cubic(polynomials_0, s0, u, t0)
             for v in range(4):
-                q = polynomials_1[s1, v]
-                w = wu * (q[0] + t1 * (q[1] + t1 * (q[2] + t1 * q[3])))
+                w = wu * cubic(polynomials_1, s1, v, t1)
                 at = corner + np.uint64(u) * plane + np.uint64(v) * row
                 a += w * flat[at]
                 b += w * flat[at + np.uint64(1)]
@@ -243,11 +248,8 @@ def evaluate_cubic_rgb(
                 j += w * flat[at + np.uint64(9)]
                 k += w * flat[at + np.uint64(10)]
                 l += w * flat[at + np.uint64(11)]  # noqa: E741
-        r = polynomials_2[s2]
-        w0 = r[0, 0] + t2 * (r[0, 1] + t2 * (r[0, 2] + t2 * r[0, 3]))
-        w1 = r[1, 0] + t2 * (r[1, 1] + t2 * (r[1, 2] + t2 * r[1, 3]))
-        w2 = r[2, 0] + t2 * (r[2, 1] + t2 * (r[2, 2] + t2 * r[2, 3]))
-        w3 = r[3, 0] + t2 * (r[3, 1] + t2 * (r[3, 2] + t2 * r[3, 3]))
+        w0, w1 = cubic(polynomials_2, s2, 0, t2), cubic(polynomials_2, s2, 1, t2)
+        w2, w3 = cubic(polynomials_2, s2, 2, t2), cubic(polynomials_2, s2, 3, t2)
         out[n, 0] = w0 * a + w1 * d + w2 * g + w3 * j
         out[n, 1] = w0 * b + w1 * e + w2 * h + w3 * k
         out[n, 2] = w0 * c + w1 * f + w2 * i + w3 * l

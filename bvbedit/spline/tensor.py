@@ -113,12 +113,16 @@ class TensorSpline:
         if len(x):
             for axis, (a, b) in enumerate(self.domain):
                 _check_inside(x[:, axis], a, b, axis)
+        return self.evaluate_inside(x).reshape(*shape, self.channels)
+
+    def evaluate_inside(self, x: Floats) -> Floats:
+        """Return the values (n, channels) at ``x`` (n, d), contiguous, known to be inside; nothing is checked."""
         out = np.empty((len(x), self.channels))
         if self.degrees == (3, 3, 3) and self.channels == 3:
             evaluate_cubic_rgb(self.knots, self._tables, self.control, x, out)
         else:
             evaluate_any(self.knots, self.degrees, self.control, x, out)
-        return out.reshape(*shape, self.channels)
+        return out
 
     def evaluate_grid(self, axes: Sequence[ArrayLike]) -> Floats:
         """Return the values (m_1, ..., m_d, channels) on the grid of the given ``axes`` of m_a parameters each.

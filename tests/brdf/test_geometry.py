@@ -8,7 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bvbedit import BvbError
+from bvbedit.brdf.angle_kernels import upper_atan2
 from bvbedit.brdf.geometry import elevation, spherical, unit_directions
+from bvbedit.jit import kernel
 from tests.brdf.samples import Glossy, random_pairs
 
 components = st.floats(-1, 1).filter(lambda v: v == 0 or abs(v) > 1e-3)
@@ -108,3 +110,17 @@ def test_more_pairs_than_one_block_holds_are_evaluated_alike(rng, monkeypatch):
     monkeypatch.undo()
     for a, b in zip(blocked, Glossy().evaluate_trusted(wi, wo), strict=True):
         np.testing.assert_array_equal(a, b)
+
+
+parts = st.floats(-1e150, 1e150).filter(lambda v: v == 0 or abs(v) > 1e-150)
+
+
+@given(parts.map(abs), parts)
+def test_the_quick_arc_tangent_is_that_of_the_library(y, x):
+    expected = math.atan2(y, x + 0.0) if y or x else 0.0
+    assert called(y, x) == pytest.approx(expected, rel=4e-16, abs=0)
+
+
+@kernel
+def called(y, x):
+    return upper_atan2(y, x)

@@ -13,6 +13,7 @@ import numpy as np
 
 from bvbedit.render.environment import EnvironmentDensity
 from bvbedit.render.scene import Plane, Scene, Sphere
+from tests.render.environments import arriving
 
 # Half the side of the square that stands for an endless plane.
 ENDLESS = 1e4
@@ -100,4 +101,4 @@ def as_mitsuba_looks_up(texels: np.ndarray) -> np.ndarray:
     directions = np.stack(np.broadcast_arrays(x, y, np.cos(theta)), axis=-1).reshape(-1, 3)
     density = EnvironmentDensity.of(texels)
     assert density is not None
-    return density.arriving(directions)[0].reshape(height, width, 3).astype(np.float32)
+    return arriving(density, directions)[0].reshape(height, width, 3).astype(np.float32)

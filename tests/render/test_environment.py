@@ -12,6 +12,8 @@ from hypothesis import strategies as st
 from bvbedit.render.environment import EnvironmentDensity, solid_angles
 from bvbedit.render.environment_kernels import draw, look_up, pdf_of
 from bvbedit.render.lights import GradientEnvironment
+from tests.render.environments import arriving
+from tests.render.environments import drawn as drawn_by
 
 LAST = 1 - 2**-53
 LARGEST = float(np.finfo(np.float32).max)
@@ -111,7 +113,7 @@ def test_look_up_is_bilinear(name, rng):
 def test_the_density_integrates_to_one(name):
     directions, solid = grid(picture(name), 3)
     assert solid.sum() == pytest.approx(4 * np.pi, rel=1e-12)
-    _, pdf = density(name).arriving(directions)
+    _, pdf = arriving(density(name), directions)
     assert pdf @ solid == pytest.approx(1.0, rel=1e-12)
 
 
@@ -126,8 +128,8 @@ def test_draws_follow_the_density(name, rng):
     """Counts in a grid that does not know the patches, whose probabilities are sums over a finer one."""
     texels, count, fine = picture(name), 1 << 17, 16
     directions, solid = grid(texels, fine)
-    expected = count * density(name).arriving(directions)[1] * solid
-    drawn, _, _ = density(name).draw(rng.random((count, 2)))
+    expected = count * arriving(density(name), directions)[1] * solid
+    drawn, _, _ = drawn_by(density(name), rng.random((count, 2)))
 
     # Boxes that are unions of cells: parts of a patch, four by four, so that also what is within is put to the test.
     def box(w):
@@ -157,9 +159,9 @@ def test_draws_follow_the_density(name, rng):
 @pytest.mark.parametrize("name", PICTURES)
 def test_what_a_draw_tells_is_what_is_there(name, rng):
     d = density(name)
-    directions, radiance, pdf = d.draw(rng.random((2000, 2)))
+    directions, radiance, pdf = drawn_by(d, rng.random((2000, 2)))
     np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1, rtol=1e-15)
-    again, pdf_again = d.arriving(directions)
+    again, pdf_again = arriving(d, directions)
     np.testing.assert_array_equal(radiance, again)
     np.testing.assert_array_equal(pdf, pdf_again)
     assert pdf.min() > 0
@@ -188,7 +190,7 @@ NEAR = (-1e-9, 0.0, 1e-9)
 @pytest.mark.parametrize("name", PICTURES)
 def test_all_that_shines_can_be_drawn(name, rng):
     directions = np.vstack([evenly(rng, 5000), extreme_directions()])
-    radiance, pdf = density(name).arriving(directions)
+    radiance, pdf = arriving(density(name), directions)
     bright = radiance.max(axis=1) > 0
     assert (pdf[bright] > 0).all()
     # No draw counts more than four times what an exact density would make of it.
@@ -211,10 +213,10 @@ def test_pictures_with_black_texels(height, width, seed, share, size):
         return
     assert found is not None
     directions, solid = grid(texels, 2)
-    radiance, pdf = found.arriving(directions)
+    radiance, pdf = arriving(found, directions)
     assert pdf @ solid == pytest.approx(1, rel=1e-12)
     assert ((pdf > 0) == (radiance.max(axis=1) > 0)).all()
-    _, radiance, pdf = found.draw(rng.random((50, 2)))
+    _, radiance, pdf = drawn_by(found, rng.random((50, 2)))
     assert (pdf > 0).all()
     assert (radiance.max(axis=1) > 0).all()
 
@@ -228,7 +230,7 @@ def test_even_light_is_drawn_evenly(rng):
         for value in (1e-44, 1.0, LARGEST):
             d = EnvironmentDensity.of(np.full((*shape, 3), value, dtype=np.float32))
             assert d is not None
-            np.testing.assert_allclose(d.draw(rng.random((100, 2)))[2], 1 / (4 * np.pi), rtol=1e-13)
+            np.testing.assert_allclose(drawn_by(d, rng.random((100, 2)))[2], 1 / (4 * np.pi), rtol=1e-13)
             assert d.unevenness == pytest.approx(1.0, rel=1e-13)
 
 
@@ -237,7 +239,7 @@ def test_all_light_of_one_texel_is_near_it(rng):
     texels[20, 100] = 1.0
     d = EnvironmentDensity.of(texels)
     assert d is not None
-    directions, _, _ = d.draw(rng.random((4096, 2)))
+    directions, _, _ = drawn_by(d, rng.random((4096, 2)))
     theta = np.arccos(directions[:, 2]) / np.pi * 64
     column = (0.5 + np.arctan2(directions[:, 0], directions[:, 1]) / (2 * np.pi)) * 128
     assert np.abs(theta - 20.5).max() <= 1 + 1e-9
@@ -249,16 +251,16 @@ def test_drawing_by_the_picture_needs_far_fewer_draws(rng):
     name, count = "hot texel", 1024
     d = density(name)
     directions, solid = grid(picture(name), 8)
-    truth = solid @ (d.arriving(directions)[0] * np.maximum(directions[:, 2:], 0))
+    truth = solid @ (arriving(d, directions)[0] * np.maximum(directions[:, 2:], 0))
 
     def terms(w, radiance, pdf):
         return radiance * np.maximum(w[:, 2:], 0) / pdf[:, None]
 
-    drawn = terms(*d.draw(rng.random((count, 2))))
+    drawn = terms(*drawn_by(d, rng.random((count, 2))))
     error = drawn.std(axis=0) / math.sqrt(count)
     assert (np.abs(drawn.mean(axis=0) - truth) < 3 * error).all()
     even = evenly(rng, 1 << 17)
-    uniform = terms(even, d.arriving(even)[0], np.full(len(even), 1 / (4 * np.pi)))
+    uniform = terms(even, arriving(d, even)[0], np.full(len(even), 1 / (4 * np.pi)))
     assert (uniform.var(axis=0) > 100 * drawn.var(axis=0)).all()
 
 
@@ -279,7 +281,7 @@ def test_whether_it_pays():
 @pytest.mark.parametrize("name", ["random", "hot poles"])
 def test_unevenness_is_the_variance_of_even_draws(name):
     directions, solid = grid(picture(name), 1)
-    _, pdf = density(name).arriving(directions)
+    _, pdf = arriving(density(name), directions)
     assert density(name).unevenness == pytest.approx(4 * np.pi * (solid @ pdf**2), rel=1e-12)
 
 

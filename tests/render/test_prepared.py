@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bvbedit.brdf.analytic import GGX, Lambert, Schlick
-from bvbedit.render import prepared, render
+from bvbedit.render import integrator, prepared, render
 from bvbedit.render.lights import ConstantEnvironment, LatLongEnvironment, PointLight, RectangleLight, Sun
 from bvbedit.render.prepared import PreparedScene
 from bvbedit.render.scene import Blob, Camera, Plane, Scene, Sphere
@@ -63,7 +63,7 @@ def test_other_densities_may_be_given():
 @pytest.mark.parametrize("wave", [1, 100])
 def test_how_the_work_is_cut_does_not_matter(wave, monkeypatch):
     expected = PreparedScene(MODELS[0], "sphere", **SIZE)
-    monkeypatch.setattr(prepared, "WAVE", wave)
+    monkeypatch.setattr(integrator, "WAVE", wave)
     ready = PreparedScene(MODELS[0], "sphere", **SIZE)
     np.testing.assert_allclose(ready.shade(OTHERS[0]), expected.shade(OTHERS[0]), rtol=1e-6)
     assert len(ready.look_ups(MODELS[0]).pixel) == len(expected.look_ups(MODELS[0]).pixel)

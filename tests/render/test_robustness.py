@@ -223,3 +223,11 @@ def test_no_energy_is_made_of_white_and_the_furnace(monkeypatch):
     for depth in (1, 2, 5):
         picture = sound(Lambert(1.0), Scene(Camera((0, -5, 2), (0, 0, 0.8), 40), objects, SKY, depth=depth))
         assert picture.max() <= 1 + 1e-5
+
+
+@pytest.mark.parametrize(("radius", "distance"), [(1.0, 1e9), (1e-4, 1e5), (1e3, 1e4)])
+def test_small_spheres_far_away_do_not_shade_themselves(radius, distance):
+    fov = np.degrees(0.1 * radius / distance)
+    camera = Camera((0, 0, distance), (0, 0, 0), fov, up=(0, 1, 0))
+    picture = sound(WHITE, Scene(camera, [Sphere((0, 0, 0), radius)], BLACK, [Sun((0, 0, 1), ONE)], depth=1))
+    np.testing.assert_allclose(picture, 1 / np.pi, rtol=5e-3)

@@ -16,9 +16,12 @@ class Cosine(Density):
     """cos theta_i / pi: a Lambertian surface."""
 
     def sample(self, wo: Floats, u: Floats) -> tuple[Floats, Floats]:
-        radius, phi = np.sqrt(u[:, 0]), 2 * np.pi * u[:, 1]
-        wi = np.stack([radius * np.cos(phi), radius * np.sin(phi), np.sqrt(1 - u[:, 0])], axis=-1)
-        return wi, self.pdf(wi, wo)
+        # Here, so that whoever evaluates models only does not wait for numba.
+        from bvbedit.brdf.sampling_kernels import draw_by_cosine
+
+        wi, density = np.empty((len(wo), 3)), np.empty(len(wo))
+        draw_by_cosine(u, wi, density)
+        return wi, density
 
     def pdf(self, wi: Floats, _wo: Floats) -> Floats:
         return np.asarray(np.maximum(wi[:, 2], 0.0) / np.pi)
