@@ -10,10 +10,11 @@ import numpy as np
 from numba import prange
 
 from bvbedit.brdf.geometry import Floats
-from bvbedit.jit import kernel, parallel_kernel
+from bvbedit.brdf.angle_kernels import upper_atan2
+from bvbedit.jit import inlined_kernel, parallel_kernel
 
 
-@kernel
+@inlined_kernel
 def cell(x: float, nodes: int) -> tuple[int, float]:
     """Return the node below ``x`` in [0, 1] and how far it is to the next, as a share."""
     x = min(max(x, 0.0), 1.0) * (nodes - 1)
@@ -21,7 +22,7 @@ def cell(x: float, nodes: int) -> tuple[int, float]:
     return i, x - i
 
 
-@kernel
+@inlined_kernel
 def bilinear(image: Floats, y: float, x: float) -> float:
     """Return ``image`` at a point of the unit square."""
     i, s = cell(y, image.shape[0])
@@ -30,7 +31,17 @@ def bilinear(image: Floats, y: float, x: float) -> float:
     return float((1.0 - s) * low + s * ((1.0 - t) * image[i + 1, j] + t * image[i + 1, j + 1]))
 
 
-@kernel
+@inlined_kernel
+def bilinear_of(images: Floats, a: int, c: int, y: float, x: float) -> float:
+    """Return channel ``c`` of the images ``a`` (n, channels, height, width) at a point of the unit square."""
+    i, s = cell(y, images.shape[2])
+    j, t = cell(x, images.shape[3])
+    low = (1.0 - t) * images[a, c, i, j] + t * images[a, c, i, j + 1]
+    high = (1.0 - t) * images[a, c, i + 1, j] + t * images[a, c, i + 1, j + 1]
+    return float((1.0 - s) * low + s * high)
+
+
+@inlined_kernel
 def to_sample(
     y: float, x: float, a: int, b: int, r: float, vndf: Floats, conditional: Floats, marginal: Floats
 ) -> tuple[float, float]:
@@ -61,14 +72,17 @@ def to_sample(
     return sample_y, sample_x
 
 
-@kernel
+@inlined_kernel
 def accumulate(
     f: Floats,
+    n: int,
     theta: float,
-    phi: float,
-    x: float,
-    y: float,
-    z: float,
+    ix: float,
+    iy: float,
+    iz: float,
+    ox: float,
+    oy: float,
+    oz: float,
     theta_i: Floats,
     sigma: Floats,
     ndf: Floats,
@@ -78,11 +92,14 @@ def accumulate(
     rgb: Floats,
     jacobian: bool,
 ) -> None:
-    """Add f_r(wi, wo) to ``f`` (3,): wi at the elevation ``theta`` and azimuth ``phi``, wo = (x, y, z)."""
-    sine = math.sin(theta)
-    hx, hy, hz = sine * math.cos(phi) + x, sine * math.sin(phi) + y, math.cos(theta) + z
-    u_x = math.sqrt(math.atan2(math.hypot(hx, hy), hz) * 2.0 / math.pi)
-    turns = (math.atan2(hy, hx) - phi + math.pi) / (2.0 * math.pi)
+    """Add f_r(wi, wo) to row n of ``f`` (., 3): wi = i at the elevation ``theta``, wo = o."""
+    hx, hy, hz = ix + ox, iy + oy, iz + oz
+    u_x = math.sqrt(upper_atan2(math.sqrt(hx * hx + hy * hy), hz) * 2.0 / math.pi)
+    if ix == 0.0 and iy == 0.0:
+        ix = 1.0
+    # The azimuth of the half vector, counted from behind wi.
+    cross = ix * hy - iy * hx
+    turns = 0.5 + math.copysign(upper_atan2(abs(cross), ix * hx + iy * hy), cross) / (2.0 * math.pi)
     u_y = turns - math.floor(turns)
 
     last = len(theta_i) - 1
@@ -93,12 +110,24 @@ def accumulate(
     r = min((theta - theta_i[a]) / (theta_i[b] - theta_i[a]), 1.0) if b > a else 0.0
 
     # The published value is f_r times the cosine of the outgoing direction.
-    factor = 1.0 / z
+    factor = 1.0 / oz
     if jacobian:
         factor *= bilinear(ndf, u_y, u_x) / (4.0 * bilinear(sigma, 0.5, math.sqrt(theta * 2.0 / math.pi)))
     s_y, s_x = to_sample(u_y, u_x, a, b, r, vndf, conditional, marginal)
     for c in range(3):
-        f[c] += factor * ((1.0 - r) * bilinear(rgb[a, c], s_y, s_x) + r * bilinear(rgb[b, c], s_y, s_x))
+        low, high = bilinear_of(rgb, a, c, s_y, s_x), bilinear_of(rgb, b, c, s_y, s_x)
+        f[n, c] += factor * ((1.0 - r) * low + r * high)
+
+
+@inlined_kernel
+def held(x: float, y: float, z: float, highest: float) -> tuple[float, float, float, float]:
+    """Return the elevation of a direction, at most ``highest``, and the direction of that elevation."""
+    sine = math.sqrt(x * x + y * y)
+    theta = upper_atan2(sine, z)
+    if theta <= highest:
+        return theta, x, y, z
+    longer = math.sin(highest) / sine
+    return highest, longer * x, longer * y, math.cos(highest)
 
 
 @parallel_kernel
@@ -118,14 +147,10 @@ def evaluate(
     """Return the mean of f_r(wi, wo) and f_r(wo, wi) (n, 3), clamped at zero, elevations held at ``highest``."""
     f = np.zeros((len(wi), 3))
     for n in prange(len(wi)):
-        t_i = min(math.atan2(math.hypot(wi[n, 0], wi[n, 1]), wi[n, 2]), highest)
-        t_o = min(math.atan2(math.hypot(wo[n, 0], wo[n, 1]), wo[n, 2]), highest)
-        p_i, p_o = math.atan2(wi[n, 1], wi[n, 0]), math.atan2(wo[n, 1], wo[n, 0])
-        s_i, s_o = math.sin(t_i), math.sin(t_o)
-        x, y, z = s_o * math.cos(p_o), s_o * math.sin(p_o), math.cos(t_o)
-        accumulate(f[n], t_i, p_i, x, y, z, theta_i, sigma, ndf, vndf, conditional, marginal, rgb, jacobian)
-        x, y, z = s_i * math.cos(p_i), s_i * math.sin(p_i), math.cos(t_i)
-        accumulate(f[n], t_o, p_o, x, y, z, theta_i, sigma, ndf, vndf, conditional, marginal, rgb, jacobian)
+        t_i, ix, iy, iz = held(wi[n, 0], wi[n, 1], wi[n, 2], highest)
+        t_o, ox, oy, oz = held(wo[n, 0], wo[n, 1], wo[n, 2], highest)
+        accumulate(f, n, t_i, ix, iy, iz, ox, oy, oz, theta_i, sigma, ndf, vndf, conditional, marginal, rgb, jacobian)
+        accumulate(f, n, t_o, ox, oy, oz, ix, iy, iz, theta_i, sigma, ndf, vndf, conditional, marginal, rgb, jacobian)
         for c in range(3):
             f[n, c] = max(0.5 * f[n, c], 0.0)
     return f

@@ -4,13 +4,13 @@ import numpy as np
 from numba import prange
 
 from bvbedit.brdf.geometry import Bools, Floats
-from bvbedit.jit import kernel, parallel_kernel
+from bvbedit.jit import inlined_kernel, parallel_kernel
 
 # A node whose share is less is there by rounding, and need not be valid.
 NEGLIGIBLE = 1e-6
 
 
-@kernel
+@inlined_kernel
 def bracket(nodes: Floats, x: float, periodic: bool) -> tuple[int, int, float]:
     """Return the two nodes around ``x`` and the share of the second: clamped at the ends, or wrapped with period 1."""
     last = len(nodes) - 1
