@@ -9,8 +9,8 @@ import math
 import numpy as np
 from numba import prange
 
-from bvbedit.brdf.geometry import Floats
 from bvbedit.brdf.angle_kernels import upper_atan2
+from bvbedit.brdf.geometry import Floats
 from bvbedit.jit import inlined_kernel, parallel_kernel
 
 
