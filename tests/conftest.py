@@ -1,8 +1,14 @@
-"""What all tests share: reproducible randomness."""
+"""What all tests share: reproducible randomness, and threads that wait without keeping a core busy."""
+
+import os
 
 import numpy as np
 import pytest
 from hypothesis import settings
+
+# Threads that spin while they wait keep the other worker from its core: tests of kernels took twice the time. Read when
+# the first parallel kernel runs.
+os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 # The same examples in every run, and no deadline: the first call of a kernel compiles it.
 settings.register_profile("bvbedit", derandomize=True, deadline=None, database=None)
