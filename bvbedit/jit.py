@@ -7,8 +7,10 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numba
+from numpy.typing import NDArray
 
 F = TypeVar("F", bound=Callable[..., Any])
+Array = TypeVar("Array", bound=NDArray[Any])
 
 
 def _compile(function: F, **options: Any) -> F:
@@ -38,3 +40,10 @@ def inlined_kernel(function: F) -> F:
 def parallel_kernel(function: F) -> F:
     """Compile ``function`` with ``prange`` loops spread over numba's threads."""
     return _compile(function, nogil=True, parallel=True)
+
+
+def frozen(array: Array) -> Array:
+    """Return a read-only view: to numba a writable array is another type, and another compilation."""
+    view = array.view()
+    view.flags.writeable = False
+    return view

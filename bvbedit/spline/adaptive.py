@@ -65,22 +65,23 @@ class AxisLines:
 
         Raises BvbError where the data do not determine a control point.
         """
+        from bvbedit.jit import frozen
         from bvbedit.spline import adaptive_kernels
 
         residual = np.empty_like(self.factor)
         if not adaptive_kernels.residual_left(
-            knots, degree, self.parameters, self.roots, self.factor, SMALLEST_PIVOT, residual
+            frozen(knots), degree, frozen(self.parameters), self.roots, self.factor, SMALLEST_PIVOT, residual
         ):
             raise BvbError(f"The data do not determine all control points over knots {shown(knots.tolist())}.")
         return residual
 
     def error(self, knots: Floats, degree: int) -> float:
         """Return the squared norm of ``residual``, infinite where the data do not determine a control point."""
+        from bvbedit.jit import frozen
         from bvbedit.spline import adaptive_kernels
 
-        return float(
-            adaptive_kernels.error_left(knots, degree, self.parameters, self.roots, self.factor, SMALLEST_PIVOT)
-        )
+        of = frozen(knots), degree, frozen(self.parameters), self.roots, self.factor
+        return float(adaptive_kernels.error_left(*of, SMALLEST_PIVOT))
 
 
 @dataclass(frozen=True)

@@ -26,12 +26,13 @@ class Banded:
 
     def apply(self, x: Floats, axis: int) -> Floats:
         """Return the matrix times ``x`` along ``axis``: (..., columns, ...) to (..., m, ...)."""
+        from bvbedit.jit import frozen
         from bvbedit.spline import kernels
 
         view, shape = _as_three(x, axis)
         out = np.empty((view.shape[0], len(self.rows), view.shape[2]))
         apply = kernels.apply_banded_shared if self.rows.shape[1] * out.size > WORTH_SHARING else kernels.apply_banded
-        apply(self.first, self.rows, view, out)
+        apply(self.first, self.rows, frozen(view), out)
         return out.reshape((*shape[:axis], len(self.rows), *shape[axis + 1 :]))
 
     def largest_difference(self, x: Floats, y: Floats, axis: int) -> float:
@@ -39,9 +40,11 @@ class Banded:
 
         Nothing of that size is stored: fresh memory takes longer than the arithmetic.
         """
+        from bvbedit.jit import frozen
         from bvbedit.spline import kernels
 
-        return float(kernels.largest_difference(self.first, self.rows, _as_three(x, axis)[0], _as_three(y, axis)[0]))
+        x, y = (frozen(_as_three(side, axis)[0]) for side in (x, y))
+        return float(kernels.largest_difference(self.first, self.rows, x, y))
 
     def apply_transposed(self, x: Floats, axis: int) -> Floats:
         """Return the transposed matrix times ``x`` along ``axis``: (..., m, ...) to (..., columns, ...)."""

@@ -38,10 +38,11 @@ def basis_derivatives(knots: Floats, degree: int, x: Floats, order: int) -> tupl
 
 
 def _values_on(span: Indices, knots: Floats, degree: int, x: Floats) -> Floats:
+    from bvbedit.jit import frozen
     from bvbedit.spline import kernels
 
     values = np.empty((len(x), degree + 1))
-    kernels.basis_at(knots, degree, span, np.ascontiguousarray(x), values)
+    kernels.basis_at(frozen(knots), degree, span, frozen(np.ascontiguousarray(x)), values)
     return values
 
 

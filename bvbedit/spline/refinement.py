@@ -37,11 +37,12 @@ def identity(n: int) -> Banded:
 
 
 def _blossoms(t: Floats, p: int, fine: Floats, q: int) -> Banded:
+    from bvbedit.jit import frozen
     from bvbedit.spline import refinement_kernels
 
     m = len(fine) - q - 1
     first, rows = np.empty(m, dtype=np.int64), np.empty((m, p + 1))
-    refinement_kernels.blossom_rows(t, p, fine, q, first, rows)
+    refinement_kernels.blossom_rows(frozen(t), p, frozen(fine), q, first, rows)
     return Banded(first, rows, len(t) - p - 1)
 
 
