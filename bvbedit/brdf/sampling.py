@@ -67,11 +67,12 @@ class HalfVectorDensity(Density):
 
     def sample(self, wo: Floats, u: Floats) -> tuple[Floats, Floats]:
         from bvbedit.brdf import sampling_kernels
+        from bvbedit.jit import frozen
 
         wi, density = np.empty((len(wo), 3)), np.empty(len(wo))
         theta, s, phi, p, rows, marginals, columns = self._tables
         sampling_kernels.draw_directions(
-            wo, u, theta, s, phi, p, rows, marginals, columns, self.cosine_share, wi, density
+            wo, frozen(u), theta, s, phi, p, rows, marginals, columns, self.cosine_share, wi, density
         )
         return wi, density
 

@@ -127,6 +127,7 @@ class _Functional:
 
     def of(self, knots: Floats) -> _Value | None:
         """Return the value at ``knots``, or None where the data do not determine the control points."""
+        from bvbedit.jit import frozen
         from bvbedit.spline import free_knots_kernels, refinement_kernels
 
         p = self.degree
@@ -148,7 +149,8 @@ class _Functional:
             # are left: d error = -2 <weights residual, dN c>.
             differences = np.diff(control[0], axis=0) / (knots[p + 1 : -1] - knots[1 : -p - 1])[:, None]
             right = (-2 * self.lines.roots)[:, None] * residual
-            free_knots_kernels.knot_slopes(knots, p, groups, self.lines.parameters, right, differences, slopes)
+            parameters = frozen(self.lines.parameters)
+            free_knots_kernels.knot_slopes(frozen(knots), p, groups, parameters, right, differences, slopes)
         condition = free_knots_kernels.inverse_norm(upper)
         # One test for all: nan and infinities spread into the sum.
         if not np.isfinite(error + condition + float(np.sum(slopes))):

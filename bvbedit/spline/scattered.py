@@ -22,6 +22,7 @@ class ScatteredBasis:
     """
 
     def __init__(self, points: Floats, knots: Sequence[Floats], degrees: Sequence[int]) -> None:
+        from bvbedit.jit import frozen
         from bvbedit.spline import scattered_kernels
 
         self.size = tuple(len(t) - p - 1 for t, p in zip(knots, degrees, strict=True))
@@ -29,7 +30,7 @@ class ScatteredBasis:
         self._first = np.empty((len(points), 3), dtype=np.int64)
         self._basis = np.zeros((len(points), 3, max(degrees) + 1))
         for a, (t, p) in enumerate(zip(knots, degrees, strict=True)):
-            scattered_kernels.basis_along(a, t, p, span_bins(t, p), points, self._first, self._basis)
+            scattered_kernels.basis_along(a, frozen(t), p, span_bins(t, p), points, self._first, self._basis)
 
     @property
     def overlap(self) -> float:
