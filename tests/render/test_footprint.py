@@ -94,10 +94,11 @@ def test_weights_are_large_where_the_scene_looks():
 
 def test_a_fit_for_a_scene_is_nearer_in_that_scene():
     measured = MATERIALS["copper"].brdf
+    options = {"size": (9, 6, 4), "chart": "half-diff", "encoding": "root"}
     prepared = PreparedScene(measured, FLASH, width=64, height=64, spp=8, seed=3)
     reference = prepared.shade(measured)
     errors = [
-        compare_pictures(prepared.shade(bvbedit.fit(measured, size=(9, 6, 4), scene=scene)), reference).mae
+        compare_pictures(prepared.shade(bvbedit.fit(measured, scene=scene, **options)), reference).mae
         for scene in (None, FLASH)
     ]
     assert errors[1] < 0.7 * errors[0]
