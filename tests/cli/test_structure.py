@@ -61,7 +61,8 @@ def test_the_storage_of_the_file_is_kept_and_its_rounding_told(storage, run, fol
     assert change <= told["max_change"] + 1e-14
     if storage.step is not None:
         assert 0.001 < told["max_change"] <= 0.0015 + 1e-12
-    for space in ("net", "linear"):
+    # A mixture that is refitted is stored as the others are: once is enough.
+    for space in ("net", "linear") if storage.step is not None else ("net",):
         assert run("blend", source, grey, target, "--t", "0.5", "--space", space)[0] == 0
         assert bvbedit.load(target).storage == storage
 
