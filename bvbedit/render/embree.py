@@ -13,7 +13,7 @@ from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
 from bvbedit.errors import BvbError
-from bvbedit.jit import kernel
+from bvbedit.jit import frozen, kernel
 from bvbedit.render.meshes import Mesh
 from bvbedit.threads import each_block
 
@@ -54,11 +54,11 @@ class Tracer:
         owner = np.repeat(np.arange(len(meshes)), [len(m.triangles) for m in meshes])
         faces = np.concatenate([m.face_normals() for m in meshes])
         self._tables: tuple[Array, Array, Array, Array, Array] = (
-            _frozen(vertices),
-            _frozen(triangles),
-            _frozen(np.concatenate(normals)),
-            _frozen(faces),
-            _frozen(owner),
+            frozen(vertices),
+            frozen(triangles),
+            frozen(np.concatenate(normals)),
+            frozen(faces),
+            frozen(owner),
         )
         # About their centre, meshes far from the origin lose no digits.
         self._centre = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
@@ -173,17 +173,10 @@ def _spread(count: int, work: Callable[[slice], None]) -> None:
 
 
 def _rays(origins: Floats, directions: Floats) -> tuple[Floats, Floats]:
-    origins, directions = (_frozen(np.ascontiguousarray(a, dtype=np.float64)) for a in (origins, directions))
+    origins, directions = (frozen(np.ascontiguousarray(a, dtype=np.float64)) for a in (origins, directions))
     if origins.shape != directions.shape or origins.shape[1:] != (3,):
         raise BvbError(f"Rays have origins {origins.shape} and directions {directions.shape}. Give (n, 3) of both.")
     return origins, directions
-
-
-def _frozen(array: Array) -> Array:
-    """Return a read-only view: to numba a writable array is another type, and another compilation."""
-    view = array.view()
-    view.flags.writeable = False
-    return view
 
 
 def _float32(array: Floats) -> NDArray[np.float32]:

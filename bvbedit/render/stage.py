@@ -13,6 +13,7 @@ from bvbedit.brdf.density import Density
 from bvbedit.brdf.materials import MATERIALS
 from bvbedit.errors import BvbError
 from bvbedit.io import load
+from bvbedit.jit import frozen
 from bvbedit.render.arrays import Glow, Lamps, Shapes
 from bvbedit.render.embree import CLEARANCE, Tracer
 from bvbedit.render.environment import EnvironmentDensity
@@ -24,9 +25,9 @@ Floats = NDArray[np.float64]
 
 # An environment is sampled as a light where it is so uneven: materials find what is evenly bright by themselves.
 WORTH_SAMPLING = 2.0
-# What stands for a black environment: read-only as others are, for to numba a writable array is another type.
-BLACK = np.frombuffer(b"", dtype=np.float32).reshape(0, 0, 3)
-NOTHING = np.frombuffer(b"", dtype=np.float64), np.frombuffer(b"", dtype=np.float64).reshape(0, 0)
+# What stands for a black environment.
+BLACK = frozen(np.zeros((0, 0, 3), dtype=np.float32))
+NOTHING = frozen(np.zeros(0)), frozen(np.zeros((0, 0)))
 
 
 @dataclass(frozen=True)
@@ -129,8 +130,7 @@ def make_stage(scene: Scene, models: Sequence[Brdf], densities: Sequence[Density
     drawn = [own[m - 1] if isinstance(m, int) else None for m in named]
 
     triangles = [_mesh(x) for x in meshed]
-    texels = np.ascontiguousarray(scene.environment.texels()).view()
-    texels.flags.writeable = False  # always: to numba a writable array is another type, and another compilation
+    texels = frozen(np.ascontiguousarray(scene.environment.texels()))
     sky = EnvironmentDensity.of(texels)
     return Stage(
         camera=scene.camera,
