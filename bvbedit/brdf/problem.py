@@ -224,17 +224,42 @@ def pose(
     Raises BvbError where these are not finite, negative, all zero, or of another shape.
     """
     shape = table.densities.shape[1:]
-    mean = float(sum(balance))
+    mean, count = float(sum(balance)), len(table.sides)
+
+    def shares(part: slice) -> list[Floats]:
+        wanted = [lam * d[part] for lam, d in zip(balance, table.densities, strict=True)]
+        return [
+            np.where(trusted[part], sum(s * w for s, w in zip(share, wanted, strict=True)) + BEYOND * mean / count, 0.0)
+            for trusted, share in zip(table.trusted, table.shares.T, strict=True)
+        ]
+
+    values, density, variance = _averaged(table, encoding, shares)
+    known = density > 0
+    if not known.all():
+        values = hold(values, known, table.chart.hold_order)
+    density = np.where(known, density, HELD * mean)
+    if weights is not None:
+        total = density.sum()
+        density = density * checked_weights(weights, table.chart, grid_points(table.axes)).reshape(shape)
+        if not density.any():
+            raise BvbError("weights are zero at all nodes. Return numbers above zero where the model is to be good.")
+        density = density * (total / density.sum())
+    surrogate = loss if surrogate is None else surrogate
+    weight = density * _squared_slopes(table, encoding, surrogate, values)
+    return Problem(table, encoding, loss, surrogate, (float(balance[0]), float(balance[1])), values, weight, variance)
+
+
+def _averaged(
+    table: Table, encoding: Encoding, shares: Callable[[slice], list[Floats]]
+) -> tuple[Floats, Floats, Floats | None]:
+    """Return encoded means over the sides by their ``shares``, the shares' sum, and the variance of the means."""
+    shape = table.densities.shape[1:]
     tells = table.chart.reciprocal and len(table.sides) > 1
     values, density = np.empty_like(table.sides[0]), np.empty(shape)
     variance = np.empty(shape) if tells else None
 
     def average(part: slice) -> None:
-        wanted = [lam * d[part] for lam, d in zip(balance, table.densities, strict=True)]
-        parts = [
-            np.where(trusted[part], sum(s * w for s, w in zip(share, wanted, strict=True)) + BEYOND * mean / count, 0.0)
-            for trusted, share in zip(table.trusted, table.shares.T, strict=True)
-        ]
+        parts = shares(part)
         density[part] = np.sum(parts, axis=0)
         filled = np.where(density[part] > 0, density[part], 1.0)[..., None]
         mixed, squares = np.zeros_like(values[part]), np.zeros_like(density[part])
@@ -251,21 +276,8 @@ def pose(
             found = np.maximum(squares - np.einsum("...c,...c->...", mixed, mixed), 0.0) / others
             variance[part] = np.where(found < ROUNDING * squares, 0.0, found)
 
-    count, rows = len(table.sides), shape[1] * shape[2]
-    each_block(shape[0], rows, average)
-    known = density > 0
-    if not known.all():
-        values = hold(values, known, table.chart.hold_order)
-    density = np.where(known, density, HELD * mean)
-    if weights is not None:
-        total = density.sum()
-        density = density * checked_weights(weights, table.chart, grid_points(table.axes)).reshape(shape)
-        if not density.any():
-            raise BvbError("weights are zero at all nodes. Return numbers above zero where the model is to be good.")
-        density = density * (total / density.sum())
-    surrogate = loss if surrogate is None else surrogate
-    weight = density * _squared_slopes(table, encoding, surrogate, values)
-    return Problem(table, encoding, loss, surrogate, (float(balance[0]), float(balance[1])), values, weight, variance)
+    each_block(shape[0], shape[1] * shape[2], average)
+    return values, density, variance
 
 
 def _squared_slopes(table: Table, encoding: Encoding, loss: Loss, values: Floats) -> Floats:
