@@ -14,6 +14,7 @@ from bvbedit.brdf.charts import FITTING_CHARTS, Chart, chart_named
 from bvbedit.brdf.encodings import Encoding, encoding_named
 from bvbedit.brdf.fit import AUTO, THOROUGH_ROUNDS, fit_net, is_published, settle
 from bvbedit.brdf.geometry import Floats
+from bvbedit.brdf.interest import Interest
 from bvbedit.brdf.losses import Loss, loss_named
 from bvbedit.brdf.metrics import Comparison, compare, estimate
 from bvbedit.brdf.noise import estimate_noise
@@ -61,7 +62,7 @@ class _Wish:
     degrees: tuple[int, int, int]
     knots: str
     loss: Loss
-    weights: Weights | None
+    weights: Weights | Interest | None
     precision: str
     rounds: int
     smoothing: float | str | None
@@ -100,9 +101,10 @@ def fit(
 
     ``metric`` names what is to be small: ``log_cosine_rms``, ``fores`` or ``relative_l1``. ``weights``, a function of
     chart parameters (n, 3) that returns (n,) >= 0, multiplies the weights that follow from it. ``scene``, as ``render``
-    has it, replaces them: what counts is what that scene shows of the material, on an 8-bit screen. ``precision``:
-    ``quantised`` (``auto``, but ``float32`` in the paper's configuration; it adds 4 % to the error), ``float16``,
-    ``float32`` or ``float64``.
+    has it, replaces both: what counts is what that scene shows of the material, on an 8-bit screen; ``tolerance`` then
+    bounds the root mean square error of its pixels, 0 ... 1 (``picture_rms``). ``precision``: ``quantised``
+    (``auto``, but ``float32`` in the paper's configuration; it adds 4 % to the error), ``float16``, ``float32`` or
+    ``float64``.
     ``smoothing`` penalises differences of the net, for noisy data: a strength, or ``auto`` for the one that generalised
     cross-validation finds. ``thorough`` takes more steps on the metric itself and seconds longer. ``source`` names the
     data in the report, whose bytes count too.
@@ -127,9 +129,10 @@ def fit(
     if scene is not None:
         if weights is not None:
             raise BvbError("weights and scene exclude each other. Give one of them.")
-        from bvbedit.render.footprint import scene_weights
+        from bvbedit.render.footprint import footprint
 
-        wish = replace(wish, weights=scene_weights(brdf, scene, wish.loss))
+        interest = footprint(brdf, scene)
+        wish = replace(wish, loss=interest.loss, weights=interest)
     if wish.weights is not None and is_published(wish.charts[0], wish.encodings[0], wish.knots):
         raise BvbError(
             "The paper's configuration weighs all alike. Leave weights and scene out, or choose other knots."
@@ -142,7 +145,7 @@ def fit(
     if size is not None:
         size = checked_size(size)
 
-    noise = estimate_noise(brdf, wish.loss)
+    noise = estimate_noise(brdf, loss_named(metric))
     if size is not None:
         wish = replace(wish, charts=charts_for(brdf, wish.charts, size))
         if len(wish.charts) == 1 and is_published(wish.charts[0], wish.encodings[0], wish.knots):
@@ -175,7 +178,7 @@ def fit(
         surrogate=best.surrogate,
     )
     # What the chart averages out of what is fitted is still in the data that nets are judged by.
-    averaged = best.chart.reciprocal and wish.loss.power == 2
+    averaged = scene is None and best.chart.reciprocal and wish.loss.power == 2
     floor = (noise.grid, noise.nodes) if averaged else (0.0, 0.0)
 
     def told(model: SplineBrdf, curve: list[Step]) -> SplineBrdf:

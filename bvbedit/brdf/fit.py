@@ -12,6 +12,7 @@ from bvbedit.brdf.base import Brdf, check_brdf
 from bvbedit.brdf.charts import IN_OUT, Chart
 from bvbedit.brdf.encodings import Encoding, Linear, check_encoding
 from bvbedit.brdf.geometry import Floats
+from bvbedit.brdf.interest import Interest
 from bvbedit.brdf.losses import loss_named
 from bvbedit.brdf.plan import Plan, checked_degrees, checked_placement, checked_size, plan, try_charts
 from bvbedit.brdf.polish import polish
@@ -128,7 +129,7 @@ def settle(
     made: Plan,
     size: Sequence[int],
     *,
-    weights: Weights | None = None,
+    weights: Weights | Interest | None = None,
     rounds: int = ROUNDS,
     smoothing: float | str | None = None,
     progress: Progress | None = None,
@@ -158,7 +159,7 @@ def _settle_over(
     knots: Sequence[Floats],
     degrees: Sequence[int],
     *,
-    weights: Weights | None = None,
+    weights: Weights | Interest | None = None,
     rounds: int = ROUNDS,
     smoothing: float | str | None = None,
     progress: Progress | None = None,

@@ -10,10 +10,10 @@ from bvbedit.brdf.base import Brdf
 from bvbedit.brdf.charts import Chart
 from bvbedit.brdf.encodings import Encoding
 from bvbedit.brdf.geometry import Floats
+from bvbedit.brdf.interest import Interest
 from bvbedit.brdf.losses import LogCosine, Loss
 from bvbedit.brdf.problem import Problem, Table, Weights, pose, secants, tabulate
-from bvbedit.brdf.sample_sets import draw
-from bvbedit.brdf.samples import Samples, in_chart, looked_up
+from bvbedit.brdf.samples import Samples, drawn, in_chart
 from bvbedit.brdf.spline_brdf import keep_faces
 from bvbedit.brdf.storage import Storage
 from bvbedit.errors import BvbError
@@ -172,7 +172,7 @@ class _Bench:
     made: Plan
     knots: tuple[Floats, ...]
     samples: Samples
-    weights: Weights | None
+    weights: Weights | Interest | None
 
     def trial(self, balance: tuple[float, float], turns: int) -> Trial:
         """Return what the quick fit does once the sets are balanced by so many turns of fitting and measuring."""
@@ -212,7 +212,7 @@ def plan(
     degrees: Sequence[int],
     placement: str,
     points: int,
-    weights: Weights | None = None,
+    weights: Weights | Interest | None = None,
     surrogate: Loss | None = None,
 ) -> Plan:
     """Return the problem of ``table`` with knots for nets of up to about so many ``points`` on each axis."""
@@ -279,15 +279,16 @@ def try_charts(
     *,
     degrees: Sequence[int],
     points: int,
-    weights: Weights | None = None,
+    weights: Weights | Interest | None = None,
 ) -> list[Trial]:
     """Return trials of each chart with each encoding for nets of about so many ``points``, the best one first.
 
     A trial lofts over dominant points on the coarse grid of the chart, judged by samples of the metric itself: what a
     folded chart cannot represent counts against it. The weights are those of ``SURROGATE``; a metric that is no mean of
-    squares is tried with its own weights too, at the end.
+    squares is tried with its own weights too, at the end. An interest has its own.
     """
-    reflectance = looked_up(brdf, draw(brdf, TRIAL_SAMPLES))
+    reflectance = drawn(brdf, TRIAL_SAMPLES, weights=weights)
+    usual = loss if isinstance(weights, Interest) else SURROGATE
 
     def bench(
         table: Table, samples: Samples, encoding: Encoding, surrogate: Loss, balance: tuple[float, float]
@@ -305,9 +306,7 @@ def try_charts(
         )
         return _Bench(made, made.knots(made.walk(points)[-1]), samples, weights)
 
-    def tried_out(
-        table: Table, samples: Samples, encoding: Encoding, surrogate: Loss = SURROGATE
-    ) -> tuple[Trial, _Bench]:
+    def tried_out(table: Table, samples: Samples, encoding: Encoding, surrogate: Loss = usual) -> tuple[Trial, _Bench]:
         # Knots for sets that count as if the model were black say little: a first fit tells better.
         balance = balance_of(samples.errors(np.zeros_like(samples.reflectance), loss))
         first = bench(table, samples, encoding, surrogate, balance).trial(balance, 0)
@@ -327,7 +326,7 @@ def try_charts(
     # The other encodings are tried in the chart that is best with the first.
     table, samples = tried[0][1].made.problem.table, tried[0][1].samples
     tried = sorted(tried + [tried_out(table, samples, encoding) for encoding in encodings[1:]], key=rank)
-    if loss != SURROGATE:
+    if loss != usual:
         tried = sorted([*tried, tried_out(table, samples, tried[0][0].encoding, loss)], key=rank)
     best, chosen = tried[0]
     # Only for the chosen one the balance is worth further turns.

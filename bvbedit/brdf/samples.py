@@ -1,4 +1,7 @@
-"""Pairs drawn from the sample sets, as the metric sees them in a chart: what fits are judged and polished by."""
+"""Pairs drawn from the sample sets, as the metric sees them in a chart: what fits are judged and polished by.
+
+An interest brings its own pairs in their place, all of them, as one set.
+"""
 
 from dataclasses import dataclass
 
@@ -9,6 +12,7 @@ from bvbedit.brdf.base import Brdf
 from bvbedit.brdf.charts import Chart
 from bvbedit.brdf.encodings import Encoding
 from bvbedit.brdf.geometry import Floats
+from bvbedit.brdf.interest import Interest
 from bvbedit.brdf.losses import Loss
 from bvbedit.brdf.problem import Weights, checked_weights
 from bvbedit.brdf.sample_sets import LARGEST_REFLECTANCE, Pairs, draw
@@ -39,7 +43,7 @@ class Samples:
     parts: tuple[slice, slice]
     """The places of each set."""
     weights: Floats
-    """(N, 1): what an error counts, 1 at most."""
+    """(N, 1 or 3): what a squared error counts, 1 at most."""
 
     def errors(self, f: Floats, loss: Loss) -> Floats:
         """Return the metric over each of the sets (2,), but for its scale, of a model's reflectance ``f`` (N, 3)."""
@@ -65,12 +69,15 @@ class Samples:
         return self.errors(encoding.decode(spline.evaluate(self.parameters)), loss)
 
 
-def draw_samples(brdf: Brdf, chart: Chart, count: int, seed: int = 0, weights: Weights | None = None) -> Samples:
+def draw_samples(
+    brdf: Brdf, chart: Chart, count: int, seed: int = 0, weights: Weights | Interest | None = None
+) -> Samples:
     """Return about ``count`` pairs of each set, with the reflectance of ``brdf``; ``seed`` chooses which.
 
-    Pairs without data behind them are left out. Raises BvbError for weights that are none.
+    Pairs without data behind them are left out. Of an interest, all its pairs are returned in place of the sets.
+    Raises BvbError for weights that are none.
     """
-    return in_chart(looked_up(brdf, draw(brdf, count, seed)), chart, weights)
+    return in_chart(drawn(brdf, count, seed, weights), chart, weights)
 
 
 @dataclass(frozen=True)
@@ -82,6 +89,15 @@ class Reflectance:
     """(N, 3)."""
 
 
+def drawn(brdf: Brdf, count: int, seed: int = 0, weights: Weights | Interest | None = None) -> Reflectance:
+    """Return about ``count`` pairs of each set with data behind them, or all those of an interest as one set."""
+    if not isinstance(weights, Interest):
+        return looked_up(brdf, draw(brdf, count, seed))
+    # What is held where no data are is seen too.
+    f = np.minimum(brdf.evaluate_unit(weights.wi, weights.wo)[0], LARGEST_REFLECTANCE)
+    return Reflectance(Pairs(weights.wi, weights.wo, (len(f), 0)), f)
+
+
 def looked_up(brdf: Brdf, pairs: Pairs) -> Reflectance:
     """Return those of the ``pairs`` behind which ``brdf`` has data, and its reflectance."""
     f, trusted = brdf.evaluate_unit(pairs.wi, pairs.wo)
@@ -90,13 +106,21 @@ def looked_up(brdf: Brdf, pairs: Pairs) -> Reflectance:
     return Reflectance(kept, np.minimum(f[trusted], LARGEST_REFLECTANCE))
 
 
-def in_chart(reflectance: Reflectance, chart: Chart, weights: Weights | None = None) -> Samples:
-    """Return pairs and reflectance as samples in ``chart``. Raises BvbError for weights that are none."""
+def in_chart(reflectance: Reflectance, chart: Chart, weights: Weights | Interest | None = None) -> Samples:
+    """Return pairs and reflectance as samples in ``chart``, those of an interest by what they count.
+
+    Raises BvbError for weights that are none.
+    """
     pairs = reflectance.pairs
     parameters = chart.to_parameters(pairs.wi, pairs.wo)
-    given = np.ones(len(parameters)) if weights is None else checked_weights(weights, chart, parameters)
+    if isinstance(weights, Interest):
+        given = weights.counts / weights.counts.max()
+    elif weights is None:
+        given = np.ones((len(parameters), 1))
+    else:
+        given = checked_weights(weights, chart, parameters)[:, None]
     cosines = pairs.wi[:, 2:], pairs.wo[:, 2:]
-    return Samples(parameters, reflectance.f, cosines, pairs.parts(), given[:, None])
+    return Samples(parameters, reflectance.f, cosines, pairs.parts(), given)
 
 
 def split(samples: Samples) -> tuple[Samples, Samples]:

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from bvbedit.brdf.base import Brdf
 from bvbedit.brdf.charts import HALF_DIFF
-from bvbedit.brdf.losses import LOSSES, SMALLEST_SHARE, Loss, loss_named
+from bvbedit.brdf.losses import LOSSES, SMALLEST_SHARE, Loss, PictureError, loss_named
 from bvbedit.brdf.metrics import estimate
 from bvbedit.brdf.samples import draw_samples
 from tests.brdf.samples import Glossy
@@ -33,7 +33,7 @@ def _cosines(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarr
     return rng.uniform(0.17, 1, (count, 1)), rng.uniform(0.17, 1, (count, 1))
 
 
-@each
+@pytest.mark.parametrize("loss", [*LOSSES.values(), PictureError(mean=0.2, scale=0.7)], ids=lambda x: x.name)
 @given(f=st.tuples(reflectances, reflectances, reflectances), cos_i=cosines, cos_o=cosines)
 def test_the_slope_is_the_difference_quotient_of_the_transform(loss, f, cos_i, cos_o):
     f, c = np.array([f]), (np.array([[cos_i]]), np.array([[cos_o]]))
