@@ -13,6 +13,8 @@ from bvbedit.spline.arguments import is_real_within, shown
 
 # A wild control point decodes to a huge reflectance, not to infinity, which would spread over a whole picture.
 LARGEST = 1e290
+# exp(-x) is above zero.
+LARGEST_EXPONENT = 700.0
 
 
 class Encoding(ABC):
@@ -31,6 +33,16 @@ class Encoding(ABC):
     @abstractmethod
     def slope(self, y: Floats) -> Floats:
         """Return df/dy >= 0 at encoded ``y`` (any shape); negative ``y`` counts as zero."""
+
+    homogeneous: bool = True
+    """Whether ``scaled`` multiplies y, so that it may be done to control points."""
+
+    @abstractmethod
+    def scaled(self, y: Floats, factor: Floats) -> Floats:
+        """Return what encodes ``factor`` >= 0 times the reflectance of ``y``; of negative ``y`` only the sign counts.
+
+        Smooth in y, negative where y is; ``factor`` is broadcast.
+        """
 
     def to_dict(self) -> dict[str, Any]:
         """Return the name and the parameters, as JSON can hold them."""
@@ -51,6 +63,9 @@ class Linear(Encoding):
 
     def slope(self, y: Floats) -> Floats:
         return np.ones_like(y)
+
+    def scaled(self, y: Floats, factor: Floats) -> Floats:
+        return np.asarray(y * factor)
 
 
 @dataclass(frozen=True)
@@ -75,6 +90,9 @@ class Root(Encoding):
         y = np.clip(y, 0.0, LARGEST ** (1 / self.k))
         return 3.0 * y * y if self.k == 3 else self.k * y ** (self.k - 1)
 
+    def scaled(self, y: Floats, factor: Floats) -> Floats:
+        return np.asarray(y * (np.cbrt(factor) if self.k == 3 else factor ** (1 / self.k)))
+
 
 @dataclass(frozen=True)
 class Log(Encoding):
@@ -94,6 +112,15 @@ class Log(Encoding):
 
     def slope(self, y: Floats) -> Floats:
         return self.eps * np.exp(np.clip(y, 0.0, np.log1p(LARGEST / self.eps)))
+
+    homogeneous = False
+
+    def scaled(self, y: Floats, factor: Floats) -> Floats:
+        # log(1 + g (e^y - 1)) = y + log(g + (1 - g) e^-y); an odd function, for below zero.
+        size = np.abs(y)
+        decayed = np.exp(-np.minimum(size, LARGEST_EXPONENT))
+        shifted = size + np.log(factor + (1.0 - factor) * decayed)
+        return np.asarray(np.sign(y) * np.where(np.asarray(factor) > 0, shifted, 0.0))
 
 
 def _checked(encoding: str, name: str, value: float, lowest: float, highest: float) -> float:

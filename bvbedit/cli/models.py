@@ -231,7 +231,7 @@ def compare(a: Path, b: Path, /, *, as_json: Json = False) -> None:
     report(result.to_dict(), as_json)
 
 
-def export(source: Path, target: Path, /, *, as_json: Json = False) -> None:
+def export_table(source: Path, target: Path, /, *, as_json: Json = False) -> None:
     """Write a model or a measurement as a MERL table (.binary) or a table on its own chart (.npz).
 
     Parameters
@@ -244,23 +244,11 @@ def export(source: Path, target: Path, /, *, as_json: Json = False) -> None:
         Print one JSON object.
     """
     from bvbedit import api
-    from bvbedit.brdf.charts import HALF_DIFF, Rusinkiewicz
-    from bvbedit.brdf.goniophotometer import measure
-    from bvbedit.brdf.measured import MeasuredBrdf
-    from bvbedit.brdf.spline_brdf import SplineBrdf
     from bvbedit.io import check_target
+    from bvbedit.io.export import TABLES, export
 
-    check_target(target, (".binary", ".npz"))
-    brdf = api.load(source)
-    merl = target.suffix == ".binary"
-    if isinstance(brdf, MeasuredBrdf) and (not merl or isinstance(brdf.chart, Rusinkiewicz)):
-        table = brdf
-    elif merl:
-        table = measure(brdf, "merl")
-    else:
-        folded = isinstance(brdf, SplineBrdf) and brdf.chart is HALF_DIFF
-        table = measure(brdf, "half-diff" if folded else "paper")
-    api.save(table, target)
+    check_target(target, TABLES)
+    table, missed = export(api.load(source), target)
     report(
         {
             "file": str(target),
@@ -268,6 +256,7 @@ def export(source: Path, target: Path, /, *, as_json: Json = False) -> None:
             "chart": table.chart.name,
             "size": list(table.valid.shape),
             "valid": float(table.valid.mean()),
+            "resampling_error": {"grid": missed.grid.log_cosine_rms, "nodes": missed.nodes.log_cosine_rms},
         },
         as_json,
     )

@@ -5,8 +5,8 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter, Token
 
+from bvbedit.cli.editing import edit_file
 from bvbedit.cli.models import Json
-from bvbedit.cli.output import progress, report
 
 
 def _numbers(_type: Any, tokens: tuple[Token, ...]) -> tuple[float, ...]:
@@ -46,13 +46,15 @@ def refine(
     as_json
         Print one JSON object.
     """
-    from bvbedit.brdf import structure
+    from bvbedit.edit.structural import InsertKnots, Refine
     from bvbedit.errors import BvbError
 
-    if (at is None) == (factor is None):
+    if at is not None and factor is None:
+        edit_file(source, target, [InsertKnots(axis=axis, at=at)], as_json)
+    elif factor is not None and at is None:
+        edit_file(source, target, [Refine(axis=axis, factor=factor)], as_json)
+    else:
         raise BvbError("Refining needs --at or --factor. Give one of them.")
-    model = _opened(source, target)
-    _finish(source, target, model, structure.refine(model, axis, at=at, factor=factor), as_json)
 
 
 def remove(source: Path, target: Path, /, *, axis: int, tolerance: float, as_json: Json = False) -> None:
@@ -71,12 +73,9 @@ def remove(source: Path, target: Path, /, *, axis: int, tolerance: float, as_jso
     as_json
         Print one JSON object.
     """
-    from bvbedit.brdf import structure
+    from bvbedit.edit.structural import RemoveKnots
 
-    model = _opened(source, target)
-    with progress(f"Removing knots of {source.name}"):
-        edited, _ = structure.remove(model, axis, tolerance)
-    _finish(source, target, model, edited, as_json)
+    edit_file(source, target, [RemoveKnots(axis=axis, tolerance=tolerance)], as_json)
 
 
 def elevate(source: Path, target: Path, /, *, axis: int, by: int = 1, as_json: Json = False) -> None:
@@ -95,10 +94,9 @@ def elevate(source: Path, target: Path, /, *, axis: int, by: int = 1, as_json: J
     as_json
         Print one JSON object.
     """
-    from bvbedit.brdf import structure
+    from bvbedit.edit.structural import Elevate
 
-    model = _opened(source, target)
-    _finish(source, target, model, structure.elevate(model, axis, by), as_json)
+    edit_file(source, target, [Elevate(axis=axis, by=by)], as_json)
 
 
 def reduce(
@@ -121,11 +119,9 @@ def reduce(
     as_json
         Print one JSON object.
     """
-    from bvbedit.brdf import structure
+    from bvbedit.edit.structural import Reduce
 
-    model = _opened(source, target)
-    edited, _ = structure.reduce(model, axis, by, tolerance)
-    _finish(source, target, model, edited, as_json)
+    edit_file(source, target, [Reduce(axis=axis, by=by, tolerance=tolerance)], as_json)
 
 
 def blend(a: Path, b: Path, target: Path, /, *, t: Numbers, space: str = "net", as_json: Json = False) -> None:
@@ -146,46 +142,7 @@ def blend(a: Path, b: Path, target: Path, /, *, t: Numbers, space: str = "net", 
     as_json
         Print one JSON object.
     """
-    from bvbedit import api
+    from bvbedit.edit.combining import Blend
 
-    first = _opened(a, target)
-    second = _opened(b, target)
-    with progress(f"Blending {a.name} with {b.name}") as watch:
-        mixed = api.blend(first, second, t[0] if len(t) == 1 else t, space, progress=watch)
-    _finish(a, target, first, mixed.told(source=f"{a.name}, {b.name}"), as_json)
-
-
-def _opened(source: Path, target: Path) -> Any:
-    """Return the model in ``source``, once it is known that ``target`` can be written."""
-    from bvbedit.brdf.spline_brdf import SplineBrdf
-    from bvbedit.errors import BvbError
-    from bvbedit.io import check_target, load
-
-    check_target(target, (".bvb",))
-    model = load(source)
-    if not isinstance(model, SplineBrdf):
-        raise BvbError(f"{source} is a measurement, not a model. Fit it first: bvbedit fit {source} {source.stem}.bvb")
-    return model
-
-
-def _finish(source: Path, target: Path, before: Any, after: Any, as_json: bool) -> None:
-    """Save the edited model as the first was stored and tell what changed, what the storage rounds off included."""
-    from bvbedit.brdf.structure import largest_change
-    from bvbedit.io import save
-
-    bytes_before = source.stat().st_size
-    spline, storage = after.spline, before.storage
-    change = largest_change(before, after.with_spline(spline.with_control(storage.rounded(spline.control))))
-    save(after.stored_as(storage), target)
-    result: dict[str, Any] = {
-        "file": str(target),
-        "size_before": list(before.spline.size),
-        "size_after": list(after.spline.size),
-        "degrees": list(after.spline.degrees),
-        "bytes_before": bytes_before,
-        "bytes_after": target.stat().st_size,
-        "max_change": change,
-    }
-    if "metrics" in after.report:
-        result["metrics"] = after.report["metrics"]
-    report({**result, "notes": list(after.report.get("notes", []))}, as_json)
+    share: Any = t[0] if len(t) == 1 else t
+    edit_file(a, target, [Blend(partner=b, t=share, space=space)], as_json)  # type: ignore[arg-type]

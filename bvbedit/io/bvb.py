@@ -3,7 +3,7 @@
 import io
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from bvbedit.brdf.charts import chart_named
@@ -29,11 +29,18 @@ MOST_KNOTS = 1 << 18
 MOST_CONTROL = 1 << 24
 
 
-def dumps(model: SplineBrdf, precision: str | None = None, *, pdf: bool = False) -> bytes:
+def dumps(
+    model: SplineBrdf,
+    precision: str | None = None,
+    *,
+    pdf: bool = False,
+    recipe: Mapping[str, Any] | None = None,
+) -> bytes:
     """Return ``model`` as the bytes of a .bvb file, its control points rounded to ``precision``.
 
     That is one of ``PRECISIONS``, or the model's own storage; "quantised", where that has no step, takes 2**-12 of the
-    largest |control point|. ``pdf`` adds the density by which directions are drawn, a few KB. Raises BvbError for an
+    largest |control point|. ``pdf`` adds the density by which directions are drawn, a few KB; ``recipe`` tells how the
+    model came about, as JSON can hold it. Raises BvbError for an
     unknown precision, control points that it cannot hold, a report that is no JSON, and more of anything than ``loads``
     would take.
     """
@@ -51,10 +58,14 @@ def dumps(model: SplineBrdf, precision: str | None = None, *, pdf: bool = False)
         "storage": _described(storage, axes),
         "report": dict(model.report),
     }
+    if recipe is not None:
+        meta["recipe"] = dict(recipe)
     try:
         text = json.dumps(meta, allow_nan=False)
     except (TypeError, ValueError, RecursionError) as error:
-        raise BvbError(f"The model's report is no JSON: {shown(str(error))}. Give texts and finite numbers.") from None
+        raise BvbError(
+            f"The model's report or recipe is no JSON: {shown(str(error))}. Give texts and finite numbers."
+        ) from None
     longest = max(len(t) for t in model.spline.knots)
     if control.size > MOST_CONTROL or longest > MOST_KNOTS or len(text) > LARGEST_META:
         raise BvbError(
@@ -145,13 +156,18 @@ def _net(archive: Archive, storage: Storage, size: tuple[int, ...]) -> Array:
 
 
 def save_bvb(
-    model: SplineBrdf, path: str | os.PathLike[str], precision: str | None = None, *, pdf: bool = False
+    model: SplineBrdf,
+    path: str | os.PathLike[str],
+    precision: str | None = None,
+    *,
+    pdf: bool = False,
+    recipe: Mapping[str, Any] | None = None,
 ) -> None:
-    """Write ``model`` to ``path``, in its own storage or as ``precision`` says, and with ``pdf`` its density.
+    """Write ``model`` to ``path``, in its own storage or as ``precision`` says, with its density and its recipe.
 
     Raises BvbError as ``dumps`` does, or where the file cannot be written.
     """
-    content = dumps(model, precision, pdf=pdf)
+    content = dumps(model, precision, pdf=pdf, recipe=recipe)
     with replacing(path) as stream:
         stream.write(content)
 
@@ -159,6 +175,14 @@ def save_bvb(
 def load_bvb(path: str | os.PathLike[str]) -> SplineBrdf:
     """Return the model in the file ``path``. Raises BvbError as ``loads`` does, or where it cannot be read."""
     return loads(_content(path), str(path))
+
+
+def load_recipe(path: str | os.PathLike[str]) -> dict[str, Any] | None:
+    """Return how the model in a .bvb file came about, as it was saved, or None. Raises BvbError as ``load_bvb``."""
+    recipe = Archive(io.BytesIO(_content(path)), str(path)).object(META, LARGEST_META).get("recipe")
+    if recipe is not None and not isinstance(recipe, dict):
+        raise BvbError(f"{path} is not a sound model: its recipe is {shown(recipe)}, not an object.")
+    return recipe
 
 
 def _content(path: str | os.PathLike[str]) -> bytes:

@@ -9,6 +9,7 @@ import datetime
 import json
 import math
 import os
+from collections.abc import Callable, Mapping
 from typing import Any, TypeVar, overload
 
 from bvbedit.errors import BvbError
@@ -18,20 +19,26 @@ from bvbedit.io.toml_lines import places
 from bvbedit.spline.arguments import LONGEST_SHOWN
 
 T = TypeVar("T")
+Change = Callable[[dict[str, Any]], None]
 
 # Bytes. What a person writes is a hundredth of it, and a file with nothing but mistakes takes seconds.
 LARGEST = 1_000_000
 
 
 @overload
-def read_settings(path: str | os.PathLike[str], kind: type[T], *, what: str = "scene") -> T: ...
+def read_settings(
+    path: str | os.PathLike[str], kind: type[T], *, what: str = "scene", change: Change | None = None
+) -> T: ...
 @overload
-def read_settings(path: str | os.PathLike[str], kind: Any, *, what: str = "scene") -> Any: ...
-def read_settings(path: str | os.PathLike[str], kind: Any, *, what: str = "scene") -> Any:
+def read_settings(
+    path: str | os.PathLike[str], kind: Any, *, what: str = "scene", change: Change | None = None
+) -> Any: ...
+def read_settings(path: str | os.PathLike[str], kind: Any, *, what: str = "scene", change: Change | None = None) -> Any:
     """Return the value of ``kind`` in the TOML file ``path``; ``what`` is the file's noun in messages.
 
     ``kind`` is a dataclass, a pydantic model, or an annotated union of them. Errors that its classes raise of
-    themselves (BvbError, any ValueError) are told in their own words.
+    themselves (BvbError, any ValueError) are told in their own words. ``change`` may alter what was read before it is
+    checked.
     Raises BvbError for a file that cannot be read, is no TOML in UTF-8, or does not fit ``kind``: in one line, with the
     first mistake in the file and how many more there are.
     """
@@ -40,26 +47,52 @@ def read_settings(path: str | os.PathLike[str], kind: Any, *, what: str = "scene
         lines = places(text)
     except BvbError as error:
         raise BvbError(f"{path}, {error}") from None
-    refused: Told = {}
-    data = {key: _plain(value, (key,), refused) for key, value in _parsed(text, path).items()}
-
-    from pydantic import TypeAdapter, ValidationError
-
-    adapter = TypeAdapter(kind)
-    try:
-        # Strictly read from JSON, lists become tuples and tables dataclasses; strictly read from Python, they do not.
-        value = adapter.validate_json(json.dumps(data), strict=True, extra="forbid")
-        mistakes = refused
-    except ValidationError as error:
-        mistakes = told(error.errors(include_url=False), data, adapter, what, refused)
+    data = _parsed(text, path)
+    if change is not None:
+        change(data)
+    value, mistakes = _validated(data, kind, what)
     if not mistakes:
         return value
     # The whole file has no line, so what is wrong with it comes first.
     first = min(mistakes, key=lines.line_of)
     line = lines.line_of(first)
+    raise BvbError(f"{path}{f', line {line}' if line else ''}: {mistakes[first]}{_others(mistakes)}")
+
+
+def line_of(path: str | os.PathLike[str], key: KeyPath, what: str = "scene") -> int:
+    """Return the line of a key, like ("objects", 1), in a file that ``read_settings`` has read; 0 for none."""
+    return places(_text(path, what)).line_of(key)
+
+
+def checked(data: Mapping[str, Any], kind: Any, *, what: str) -> Any:
+    """Return the value of ``kind`` that ``data`` holds, as TOML or JSON would. Raises BvbError as ``read_settings``.
+
+    ``kind`` may be pydantic's adapter of it: to make one takes long where the kind is a large union.
+    """
+    value, mistakes = _validated(data, kind, what)
+    if mistakes:
+        raise BvbError(f"{next(iter(mistakes.values()))}{_others(mistakes)}")
+    return value
+
+
+def _validated(data: Mapping[str, Any], kind: Any, what: str) -> tuple[Any, Told]:
+    """Return the value of ``kind``, or the mistakes."""
+    refused: Told = {}
+    plain = {key: _plain(value, (key,), refused) for key, value in data.items()}
+
+    from pydantic import TypeAdapter, ValidationError
+
+    adapter = kind if isinstance(kind, TypeAdapter) else TypeAdapter(kind)
+    try:
+        # Strictly read from JSON, lists become tuples and tables dataclasses; strictly read from Python, they do not.
+        return adapter.validate_json(json.dumps(plain), strict=True, extra="forbid"), refused
+    except ValidationError as error:
+        return None, told(error.errors(include_url=False), plain, adapter, what, refused)
+
+
+def _others(mistakes: Told) -> str:
     others = len(mistakes) - 1
-    more = ["", " There is 1 more mistake.", f" There are {others} more mistakes."][min(others, 2)]
-    raise BvbError(f"{path}{f', line {line}' if line else ''}: {mistakes[first]}{more}")
+    return ["", " There is 1 more mistake.", f" There are {others} more mistakes."][min(others, 2)]
 
 
 def _text(path: str | os.PathLike[str], what: str) -> str:

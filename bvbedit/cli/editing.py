@@ -1,0 +1,196 @@
+"""Commands that edit by words: edit, run, history."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+from bvbedit.cli.models import Json
+from bvbedit.cli.output import progress, report
+
+if TYPE_CHECKING:
+    from bvbedit.edit.document import Document
+    from bvbedit.edit.operation import Edit
+
+MOST_JOBS = 256
+
+
+def edit(
+    source: Path,
+    target: Path,
+    /,
+    *,
+    op: Annotated[list[str], Parameter(negative="")],
+    precision: str | None = None,
+    as_json: Json = False,
+) -> None:
+    """Edit a model in words, like --op "tint rgb=1,0.8,0.6 theta_h=0..20"; bvbedit edit --help lists the operations.
+
+    gain factor | tint rgb or hue, saturation | broaden, sharpen factor keep_energy | raise_grazing amount power |
+    denoise strength | blend partner t space | move_points at rgb | make_plausible | insert_knots, refine,
+    remove_knots, elevate, reduce axis. Regions are theta_h, theta_d, phi_d, theta_i, theta_o, phi=FROM..TO in degrees,
+    with falloff; part is all, body or highlight.
+
+    Parameters
+    ----------
+    source
+        The .bvb model to edit.
+    target
+        The .bvb file to write; it keeps the history.
+    op
+        An edit; give --op again for each further one.
+    precision
+        float16, float32, float64 or quantised, in place of the model's own.
+    as_json
+        Print one JSON object.
+    """
+    from bvbedit.edit.operations import edit_of_line
+
+    edit_file(source, target, [edit_of_line(line) for line in op], as_json, precision)
+
+
+def edit_file(source: Path, target: Path, edits: "Sequence[Edit]", as_json: bool, precision: str | None = None) -> None:
+    """Make edits to the model in a file, write it with its history, and tell what changed."""
+    from bvbedit.edit.document import Document
+    from bvbedit.errors import BvbError
+    from bvbedit.io import check_target
+
+    check_target(target, (".bvb",))
+    document = Document.open(source)
+    bytes_before = source.stat().st_size
+    with progress(f"Editing {source.name}") as watch:
+        for n, each in enumerate(edits):
+            try:
+                document = document.do(each)
+            except BvbError as error:
+                raise BvbError(
+                    f"{each.op}: {error}" if len(edits) == 1 else f"edit {n + 1} ({each.op}): {error}"
+                ) from None
+            if watch is not None:
+                watch((n + 1) / len(edits))
+    document.save(target, precision=precision)
+    report({**_told(document, target), "bytes_before": bytes_before, "bytes_after": target.stat().st_size}, as_json)
+
+
+def _told(document: "Document", target: Path) -> dict[str, Any]:
+    """Return what an edited file has become, what its storage rounds off included."""
+    from bvbedit.edit.document import Changes
+    from bvbedit.io import load
+
+    before, saved = document.at(0), load(target)
+    changes = Changes(before, saved)  # type: ignore[arg-type]
+    told = document.model.report
+    was, now = changes.plausibility()
+    result: dict[str, Any] = {
+        "file": str(target),
+        "size_before": list(before.spline.size),
+        "size_after": list(document.model.spline.size),
+        "degrees": list(document.model.spline.degrees),
+        "max_change": changes.max_change,
+        **{key: told[key] for key in ("metrics", "refit_error") if key in told},
+        "plausibility": {"before": was.text(), "after": now.text()},
+        "notes": list(told.get("notes", [])),
+    }
+    return result
+
+
+def run(
+    recipe: Path,
+    /,
+    *,
+    set_: Annotated[list[str] | None, Parameter(name="--set", negative="")] = None,
+    on: Annotated[list[Path] | None, Parameter(consume_multiple=True, negative="")] = None,
+    out: Path | None = None,
+    jobs: int = 1,
+    again: Annotated[bool, Parameter(negative="")] = False,
+    as_json: Json = False,
+) -> None:
+    """Make a recipe: for its own source, or for many materials.
+
+    Parameters
+    ----------
+    recipe
+        A TOML file of source, steps and outputs.
+    set_
+        Change a parameter of a step by its label or number, like warm.rgb=1,0.7,0.5.
+    on
+        Materials in place of the recipe's source: models or measurements.
+    out
+        The folder to write into; by default that of the recipe. Made if it is not there.
+    jobs
+        How many materials at once.
+    again
+        Make also what is up to date.
+    as_json
+        Print one JSON object.
+    """
+    from bvbedit.errors import BvbError
+    from bvbedit.run import jobs_of
+    from bvbedit.run import run as run_all
+
+    if not 1 <= jobs <= MOST_JOBS:
+        raise BvbError(f"--jobs is {jobs}. Give a number in 1 ... {MOST_JOBS}.")
+    work = jobs_of(recipe, set_ or [], on or [], out)
+    done = 0
+    with progress(recipe.name) as watch:
+
+        def tell(_: object) -> None:
+            nonlocal done
+            done += 1
+            if watch is not None:
+                watch(done / len(work))
+
+        outcomes = run_all(work, jobs, again=again, progress=tell)
+    failed = [outcome for outcome in outcomes if outcome.status == "failed"]
+    if failed and len(outcomes) == 1:
+        raise BvbError(str(failed[0].error))
+    if as_json:
+        report({"recipe": str(recipe), "materials": [o.to_dict() for o in outcomes]}, True)
+    else:
+        width = max(len(Path(o.source).name) for o in outcomes)
+        for o in outcomes:
+            what = o.error if o.status == "failed" else ", ".join(str(path) for path in o.outputs)
+            print(f"{Path(o.source).name:<{width}}  {o.status:<10}  {o.seconds:6.2f} s  {what}")
+    if failed:
+        raise BvbError(f"{len(failed)} of {len(outcomes)} could not be made: {failed[0].source}: {failed[0].error}")
+
+
+def history(source: Path, /, *, recipe: Annotated[bool, Parameter(negative="")] = False, as_json: Json = False) -> None:
+    """Tell how a model came about.
+
+    Parameters
+    ----------
+    source
+        The .bvb model.
+    recipe
+        Print a recipe in TOML that makes the same model again.
+    as_json
+        Print one JSON object.
+    """
+    from bvbedit.edit.document import Document
+    from bvbedit.edit.recipe import to_toml
+    from bvbedit.errors import BvbError
+    from bvbedit.io.bvb import load_recipe
+
+    if recipe and as_json:
+        raise BvbError("--recipe and --json exclude each other. Give one of them.")
+    document = Document.open(source)
+    told = load_recipe(source)
+    if told is None:
+        if recipe:
+            raise BvbError(f"{source} has no history: it was fitted or saved without one. Edit it first.")
+        told = {"source": dict(document.source), "steps": []}
+    if recipe:
+        # Seen from the file's own folder, in which a recipe is best put.
+        print(to_toml({k: v for k, v in told.items() if k != "made"}, [f"{source.stem}-again.bvb"]), end="")
+        return
+    if as_json:
+        report({"file": str(source), "source": told["source"], "steps": told["steps"]}, True)
+        return
+    lines = document.lines[: len(told["steps"])]
+    print(f"from {told['source'].get('file') or told['source'].get('sample') or 'a model without a file'}")
+    for n, line in enumerate(lines, 1):
+        print(f"{n:3}  {line}")
+    if not lines:
+        print("no edits")
