@@ -21,7 +21,7 @@ from bvbedit.brdf.noise import estimate_noise
 from bvbedit.brdf.plan import Plan, checked_degrees, checked_placement, checked_size, plan, try_charts
 from bvbedit.brdf.problem import Weights, charts_for, on_any_chart, tabulate
 from bvbedit.brdf.samples import Samples, draw_samples
-from bvbedit.brdf.sizing import Step, error_curve, knee, points_for, sufficient
+from bvbedit.brdf.sizing import Step, error_curve, knee, points_for, sufficient, traded
 from bvbedit.brdf.soundness import soundness
 from bvbedit.brdf.spline_brdf import SplineBrdf
 from bvbedit.brdf.storage import PRECISIONS, storage_named
@@ -186,16 +186,19 @@ def fit(
             noise=noise.to_dict(), tried=[t.to_dict() for t in trials], curve=[step.to_dict() for step in curve]
         )
 
+    def dealt(size: tuple[int, ...]) -> tuple[int, ...]:
+        return size if scene is None else traded(made, samples, size)
+
     if budget is not None:
         count = file_bytes if max_bytes is not None else payload_bytes
         curve = error_curve(made, samples, int(np.prod(size_within(made, samples, budget, wish.precision, count))))
-        size = sufficient(curve, floor).size
+        size = dealt(sufficient(curve, floor).size)
         while True:
             model = told(_settled(brdf, made, size, wish, samples, progress), curve)
             kept = kept_within(model, budget, count, lambda stored: _measured(stored, brdf, start))
             if kept is not None:
                 return kept
-            size = _smaller(made, size, (budget - reserved(count)) / count(model), budget)
+            size = dealt(_smaller(made, size, (budget - reserved(count)) / count(model), budget))
     if size is not None:
         model = _settled(brdf, made, size, wish, samples, progress)
         return _measured(told(model, error_curve(made, samples, points)), brdf, start)

@@ -1,7 +1,7 @@
 """How large a net has to be: the error over the number of control points, its knee, and the size for a tolerance."""
 
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, permutations
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,8 @@ FIRST_POINTS = 125
 WORTH_DOUBLING = 0.15
 # Errors that differ by less are the same.
 AS_GOOD = 0.02
+# Times that control points are moved from one axis to another.
+TRADES = 6
 # No control points are worth having for smaller errors. Of log_cosine_rms it is a hundredth of the smallest step of an
 # 8-bit picture in the middle of its range.
 UNSEEN = 2e-5
@@ -65,6 +67,33 @@ def step_of(made: Plan, samples: Samples, size: tuple[int, ...]) -> Step:
     problem = made.problem
     errors = samples.errors_of(made.lofted(size), problem.encoding, problem.loss)
     return Step(size, *samples.metrics(errors, problem.loss))
+
+
+def traded(made: Plan, samples: Samples, size: tuple[int, ...]) -> tuple[int, ...]:
+    """Return a net of no more control points, moved between axes for as long as that makes quick fits better.
+
+    The walk takes what axes gain to add up. Of weights that are far from separable it does not.
+    """
+    points, best = int(np.prod(size)), step_of(made, samples, size)
+    for _ in range(TRADES):
+        tried = [step_of(made, samples, n) for n in _neighbours(made, best.size, points)]
+        found = min(tried, key=Step.score, default=best)
+        if found.score() > (1 - AS_GOOD) * best.score():
+            break
+        best = found
+    return best.size
+
+
+def _neighbours(made: Plan, size: tuple[int, ...], points: int) -> list[tuple[int, ...]]:
+    """Return nets of at most so many control points: a tenth of an axis is given to another one."""
+    nets = []
+    for giver, taker in permutations(range(len(size)), 2):
+        net = list(size)
+        net[giver] = max(size[giver] - max(1, round(size[giver] / 10)), made.paths[giver].fewest)
+        net[taker] = min(points * net[taker] // int(np.prod(net)), made.paths[taker].most)
+        if net[giver] < size[giver] and net[taker] > size[taker]:
+            nets.append(tuple(net))
+    return nets
 
 
 def knee(curve: list[Step], noise: tuple[float, float] = (0.0, 0.0)) -> Step:
