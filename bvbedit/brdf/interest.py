@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from bvbedit.brdf.charts import Chart
 from bvbedit.brdf.geometry import Floats
-from bvbedit.brdf.losses import Loss
+from bvbedit.brdf.losses import PictureError
 
 # Cells of a chart along each axis: some ten pairs for each. With half as many more along each axis, chrome gained 1
 # to 5 % and satin lost a tenth.
@@ -21,7 +21,7 @@ class Interest:
     wi: Floats
     wo: Floats
     counts: Floats
-    loss: Loss
+    loss: PictureError
 
     def shares(self, chart: Chart, cells: tuple[int, int, int] = CELLS) -> Floats:
         """Return which share of what counts falls into each of the ``cells`` of a chart's parameter box."""

@@ -12,6 +12,7 @@ from bvbedit.brdf.losses import PictureError
 from bvbedit.brdf.plan import plan
 from bvbedit.brdf.problem import UNASKED, pose, tabulate
 from bvbedit.brdf.samples import draw_samples
+from bvbedit.brdf.sizing import step_of, traded
 from tests.brdf.samples import Glossy, random_pairs
 
 LOSS = PictureError(mean=0.1)
@@ -104,3 +105,14 @@ def test_the_error_is_small_where_the_pairs_are(chart, rng):
 
     assert error(steep, steep) < 0.7 * error(grazing, steep)
     assert error(grazing, grazing) < 0.7 * error(steep, grazing)
+
+
+@each_chart
+def test_trading_between_axes_costs_no_control_points_and_lowers_the_error(chart, rng):
+    interest, brdf = _near(rng, 30, 80), Glossy(0.3)
+    options = {"degrees": (3, 3, 3), "placement": "dominant", "points": 900, "weights": interest}
+    made = plan(tabulate(brdf, chart, SMALL), Root(), LOSS, (1.0, 1.0), **options)
+    samples, size = draw_samples(brdf, chart, 1, weights=interest), (6, 6, 9)
+    found = traded(made, samples, size)
+    assert np.prod(found) <= np.prod(size)
+    assert step_of(made, samples, found).score() <= step_of(made, samples, size).score()
