@@ -23,16 +23,14 @@ def plot_curve(model: Any, source: str, target: Path) -> None:
     metric = told["metric"]
     size = model.spline.size
     figure, axes = pyplot.subplots(figsize=(8, 5), layout="constrained")
-    for name, colour in COLOURS.items():
-        axes.plot(points, [step[name] for step in told["curve"]], "o-", color=colour, label=f"{name}, quick fit")
-        axes.plot(
-            [np.prod(size)],
-            [told["metrics"][name][metric]],
-            "*",
-            color=colour,
-            markersize=16,
-            label=f"{name}, this model",
-        )
+    # A fit for a scene has one error, over what that scene looks at, and the metrics do not tell it.
+    known = metric in told["metrics"]["grid"]
+    for name, colour in COLOURS.items() if known else [("grid", COLOURS["grid"])]:
+        errors = [step[name] for step in told["curve"]]
+        axes.plot(points, errors, "o-", color=colour, label=f"{name if known else 'scene'}, quick fit")
+        if known:
+            error, label = told["metrics"][name][metric], f"{name}, this model"
+            axes.plot([np.prod(size)], [error], "*", color=colour, markersize=16, label=label)
     axes.axvline(float(np.prod(size)), color="0.7", linewidth=1, zorder=0)
     axes.set(xscale="log", yscale="log", xlabel="control points", ylabel=metric.replace("_", " "))
     tried = "\n".join(f"{t['chart']} {t['encoding']}: {np.sqrt(t['grid'] * t['nodes']):.3g}" for t in told["tried"])

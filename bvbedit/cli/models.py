@@ -79,7 +79,8 @@ def fit(
     max_payload
         Most bytes of control points and interior knots as stored, in place of a size.
     tolerance
-        Largest metric, in place of a size: the smallest net that keeps it on both sets of samples.
+        Largest metric, in place of a size: the smallest net that keeps it on both sets of samples. With a scene, the
+        largest root mean square error of its pixels, as a share of white.
     metric
         log_cosine_rms, fores or relative_l1: what is to be small.
     scene
