@@ -5,6 +5,7 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from bvbedit.brdf.base import Brdf
 from bvbedit.brdf.charts import FITTING_CHARTS, Chart
@@ -73,6 +74,15 @@ class SplineBrdf(Brdf):
     def told(self, **more: Any) -> "SplineBrdf":
         """Return the same model with ``more`` in its report."""
         return SplineBrdf(self.spline, self.chart, self.encoding, {**self.report, **more}, storage=self.storage)
+
+    def albedo(self, theta_o: ArrayLike) -> Floats:
+        """Return the directional albedo (..., 3) for elevations ``theta_o`` (...) of wo, in radians.
+
+        Raises BvbError for elevations outside [0, pi/2]. ``plausibility.albedo`` tells the error, too.
+        """
+        from bvbedit.brdf.albedo import albedo_value
+
+        return albedo_value(self, theta_o)
 
     def _evaluate(self, wi: Floats, wo: Floats) -> tuple[Floats, Bools]:
         f = self.encoding.decode(self.spline.evaluate_inside(self.chart.to_parameters(wi, wo)))

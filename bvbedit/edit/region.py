@@ -102,8 +102,8 @@ def _half_angles(chart: Chart, points: Floats) -> Floats:
 def _plain_angles(chart: Chart, points: Floats) -> Floats:
     """Return theta_i, theta_o and phi in degrees (n, 3)."""
     if chart is IN_OUT:
-        return IN_OUT.angles(points)
+        return np.asarray(IN_OUT.angles(points))
     wi, wo = chart.to_directions(points)
     elevations = [np.arctan2(np.hypot(w[:, 0], w[:, 1]), w[:, 2]) for w in (wi, wo)]
     cross, dot = wi[:, 0] * wo[:, 1] - wi[:, 1] * wo[:, 0], np.einsum("nc,nc->n", wi[:, :2], wo[:, :2])
-    return np.degrees(np.stack([*elevations, np.arctan2(np.abs(cross), dot)], axis=-1))
+    return np.asarray(np.degrees(np.stack([*elevations, np.arctan2(np.abs(cross), dot)], axis=-1)))
