@@ -25,7 +25,10 @@ def autosave(document: Document, path: str | PathLike[str]) -> None:
     Raises BvbError where it cannot be written.
     """
     undone = [edit.to_dict() for edit in document.edits[document.position :]]
-    save_bvb(document.model, autosave_path(path), "float64", recipe={**document.recipe(), "undone": undone})
+    # Of the states that can be redone, too.
+    names = {name: k + len(document.past) for name, k in document.names.items()}
+    recipe = {**document.recipe(), "undone": undone, "names": names}
+    save_bvb(document.model, autosave_path(path), "float64", recipe=recipe)
 
 
 def discard_autosave(path: str | PathLike[str]) -> None:
@@ -45,18 +48,22 @@ def recovered(path: str | PathLike[str]) -> Document | None:
     model, recipe = load(kept), load_recipe(kept)
     if not isinstance(model, SplineBrdf) or recipe is None:
         raise BvbError(f"{kept} is no kept document. Remove it.")
-    steps = [edit_of(step) for step in recipe["steps"]]
-    undone = [edit_of(step) for step in recipe.get("undone", [])]
+    try:
+        steps = [edit_of(step) for step in recipe["steps"]]
+        undone = [edit_of(step) for step in recipe.get("undone", [])]
+        source, named = dict(recipe["source"]), dict(recipe.get("names", {}))
+    except (KeyError, TypeError, ValueError) as error:
+        raise BvbError(f"{kept} has a history that cannot be read: {error!r}. Remove it.") from None
     try:
         opened = Document.open(path)
-        if opened.past == tuple(steps[: len(opened.past)]) and opened.source == recipe["source"]:
+        if opened.past == tuple(steps[: len(opened.past)]) and opened.source == source:
             again = opened
             for edit in (*steps[len(opened.past) :], *undone):
                 again = again.do(edit)
             again = again.undo(len(undone))
             if digest(again.model) == digest(model):
-                names = {k: v - len(opened.past) for k, v in recipe.get("names", {}).items() if v >= len(opened.past)}
+                names = {k: v - len(opened.past) for k, v in named.items() if v >= len(opened.past)}
                 return replace(again, names=MappingProxyType(names))
     except BvbError:
         pass  # the file is gone, or a partner: then the model stands for itself
-    return Document(MappingProxyType(dict(recipe["source"])), tuple(steps), states=(model,))
+    return Document(MappingProxyType(source), tuple(steps), states=(model,))

@@ -154,7 +154,7 @@ def test_a_density_is_large_where_the_scene_looks():
 
 def test_a_fit_for_a_scene_is_nearer_in_that_scene():
     measured = MATERIALS["copper"].brdf
-    options = {"size": (9, 6, 4), "chart": "half-diff", "encoding": "root"}
+    options = {"size": (9, 6, 4), "chart": "half-diff"}
     prepared = PreparedScene(measured, FLASH, width=64, height=64, spp=8, seed=3)
     reference = prepared.shade(measured)
     errors = [
