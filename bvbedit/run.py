@@ -175,12 +175,7 @@ def _outputs(recipe: Recipe, job: Job) -> list[tuple[Output, Path]]:
     outputs = recipe.outputs or (EACH,)
     if job.many:
         alone = len(outputs) == 1
-        outputs = tuple(
-            o
-            if "{name}" in o.file
-            else replace(o, file=_told_apart(Path(o.file), alone))
-            for o in outputs
-        )
+        outputs = tuple(o if "{name}" in o.file else replace(o, file=_told_apart(Path(o.file), alone)) for o in outputs)
     return [(output, output.path(job.folder, name)) for output in outputs]
 
 

@@ -57,8 +57,8 @@ class Plausibility:
 
     @property
     def plausible(self) -> bool:
-        """Whether there is nothing to complain about."""
-        return not self.creates_energy and not self.negative and self.reciprocal
+        """Whether no energy is created and light may go either way; a negative spline only means no reflectance."""
+        return not self.creates_energy and self.reciprocal
 
     def to_dict(self) -> dict[str, Any]:
         """Return the findings by name, as JSON can hold them."""
@@ -74,7 +74,7 @@ class Plausibility:
         negative = "nowhere negative"
         if self.negative:
             places = ", ".join(f"{name} {angle:.3g}" for name, angle in self.lowest_at.items())
-            negative = f"encoded values down to {self.lowest:.2g} ({places} degrees)"
+            negative = f"black where the spline is negative, down to {self.lowest:.2g} ({places} degrees)"
         exchanged = "reciprocal"
         if not self.reciprocal:
             exchanged = (
@@ -157,13 +157,15 @@ def check(model: SplineBrdf) -> Plausibility:
 
 
 def make_plausible(
-    model: SplineBrdf, *, energy: bool = True, negative: bool = True, reciprocity: bool = True
+    model: SplineBrdf, *, energy: bool = True, negative: bool = False, reciprocity: bool = True
 ) -> tuple[SplineBrdf, Repair]:
     """Return the model with what is asked for repaired by a small change, and what was changed.
 
-    ``reciprocity``: an ``in-out`` net is averaged with its transpose, over common knots. ``negative``: control points
-    are raised towards zero where the spline is below it. ``energy``: f m(theta_i) m(theta_o) takes the place of f, with
-    m <= 1 such that the albedo is at most 1. A model that needs nothing is returned as it is.
+    ``reciprocity``: an ``in-out`` net is averaged with its transpose, over common knots. ``energy``: f m(theta_i)
+    m(theta_o) takes the place of f, with m <= 1 such that the albedo is at most 1. ``negative``: control points are
+    raised towards zero where the spline is below it; not by default, for reflectance is zero there already, and where a
+    net dives far below zero beside a mirror's peak, raising it changes the look by much. A model that needs nothing is
+    returned as it is.
     Raises BvbError for what is no SplineBrdf, and for albedos beyond float64.
     """
     check_spline_brdf(model)
@@ -182,7 +184,7 @@ def make_plausible(
             up = edited.spline.control - before.spline.control
             count, most = max(count, int(np.count_nonzero(up))), max(most, float(up.max()))
         if energy:
-            edited, more = dimmed(edited, strict=turn > 0)
+            edited, more = dimmed(edited)
             factors = factors * more
         if edited is before:
             break

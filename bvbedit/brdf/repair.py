@@ -17,6 +17,8 @@ from bvbedit.spline.tensor import TensorSpline
 # a repaired model must not create any, twice as many.
 ELEVATIONS = np.radians(np.concatenate([np.arange(170) / 2, np.arange(850, 901) / 10]))
 WATCHED = np.radians(np.concatenate([np.arange(340) / 4, np.arange(1700, 1801) / 20]))
+# Above 1 by so little is what a constant of albedo 1 may be found to be.
+NOTHING = 1e-5
 # Energy is taken down to GOAL where there is more than ENOUGH: between the elevations an albedo may swing up.
 GOAL, ENOUGH = 1 - 3e-4, 1 - 1e-4
 # Steps towards factors that change no more than they must, at most, and when they end: no logarithm moves so far. Then
@@ -150,13 +152,13 @@ def creates(value: Floats, error: Floats) -> Bools:
     return np.asarray(value > 1 + error)
 
 
-def dimmed(model: SplineBrdf, *, strict: bool = False) -> tuple[SplineBrdf, Floats]:
+def dimmed(model: SplineBrdf) -> tuple[SplineBrdf, Floats]:
     """Return the model f m(theta_i) m(theta_o) whose albedo is at most 1, and m (n, 3) of each channel.
 
     m <= 1 stands at the Greville abscissae of axis 1, times pi/2, linear in between; a control point is multiplied by
     what belongs to the pair of directions at its own. m is found by damped steps, as Sinkhorn & Knopp (1967) balance a
     matrix: it falls where an albedo near by is above 1, and rises, up to 1, where none is.
-    The same model where no energy is created; what is above 1 by less than its error counts if ``strict`` only.
+    The same model where the albedo is nowhere above 1 by more than the quadrature's rounding.
     Raises BvbError for albedos that are not finite.
     """
     seen = albedo(model, ELEVATIONS)
@@ -165,7 +167,7 @@ def dimmed(model: SplineBrdf, *, strict: bool = False) -> tuple[SplineBrdf, Floa
     spline = model.spline
     nodes = HALF_PI * spline.greville[1]
     m = np.ones((len(nodes), 3))
-    if not creates(seen.value, 0.0 * seen.error if strict else seen.error).any():
+    if not (seen.value > 1 + NOTHING).any():
         return model, m
     angles = [elevation(w) for w in model.chart.to_directions(grid_points(spline.greville))]
     kept: Kept = {}

@@ -183,7 +183,8 @@ def history(source: Path, /, *, recipe: Annotated[bool, Parameter(negative="")] 
         told = {"source": dict(document.source), "steps": []}
     if recipe:
         # Seen from the file's own folder, in which a recipe is best put.
-        print(to_toml({k: v for k, v in told.items() if k != "made"}, [f"{source.stem}-again.bvb"]), end="")
+        kept = {key: value for key, value in told.items() if key != "made"}
+        print(to_toml(kept, [f"{source.stem}-again.bvb"], document.model.storage.precision), end="")
         return
     if as_json:
         report({"file": str(source), "source": told["source"], "steps": told["steps"]}, True)

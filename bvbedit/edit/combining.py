@@ -88,9 +88,9 @@ class MakePlausible(Edit):
 
     op: Literal["make_plausible"] = "make_plausible"
     energy: bool = choice("no more light leaves than arrives", default=True)
-    negative: bool = choice("no value below zero", default=True)
+    negative: bool = choice("raise the net where it is below zero and reflectance is zero", default=False)
     reciprocity: bool = choice("the same in both directions", default=True)
-    about: ClassVar[str] = "no more light than arrives, nothing negative, the same in both directions"
+    about: ClassVar[str] = "no more light than arrives, the same in both directions"
 
     def apply(self, model: SplineBrdf) -> SplineBrdf:
         edited, repair = make_plausible(model, energy=self.energy, negative=self.negative, reciprocity=self.reciprocity)

@@ -230,8 +230,8 @@ def _set(data: dict[str, Any], setting: str) -> None:
     steps[n][key] = value_of(text)
 
 
-def to_toml(recipe: Mapping[str, Any], outputs: Sequence[str] = ()) -> str:
-    """Return the recipe of a document as TOML, which ``read_recipe`` reads, with the files it is to make."""
+def to_toml(recipe: Mapping[str, Any], outputs: Sequence[str] = (), precision: str | None = None) -> str:
+    """Return the recipe of a document as TOML, which ``read_recipe`` reads, with the files it is to make, and how."""
     import tomlkit
 
     source = dict(recipe["source"])
@@ -239,5 +239,6 @@ def to_toml(recipe: Mapping[str, Any], outputs: Sequence[str] = ()) -> str:
     fit = source.pop("fit", None)
     data = {**recipe, "source": source, **({"fit": fit} if fit else {})}
     if outputs:
-        data["outputs"] = [{"file": file} for file in outputs]
+        how = {} if precision is None else {"precision": precision}
+        data["outputs"] = [{"file": file, **how} for file in outputs]
     return str(tomlkit.dumps(data))

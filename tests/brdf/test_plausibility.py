@@ -59,7 +59,7 @@ def _model(what: str) -> SplineBrdf:
 
 @functools.cache
 def _repaired(what: str):
-    return make_plausible(_model(what))
+    return make_plausible(_model(what), negative=True)
 
 
 def _scaled(model: SplineBrdf, factor: float) -> SplineBrdf:
@@ -142,7 +142,7 @@ def test_a_constant_reflects_its_share_at_every_elevation(chart, encoding):
     assert (np.abs(found.value - rho) <= found.error).all()
     fine = quadrature.albedo_value(grey, np.linspace(0, np.pi / 2, 31), (24, 24))
     np.testing.assert_allclose(fine, np.broadcast_to(rho, (31, 3)), rtol=2e-6)
-    assert make_plausible(grey)[0] is grey
+    assert make_plausible(grey, negative=True)[0] is grey
 
 
 @CHARTS
@@ -180,7 +180,7 @@ def test_what_is_no_model_or_no_elevation_is_refused():
         assert "Elevations" in refusal(lambda theta=theta: _model("rough").albedo(theta))
     net = np.full((2, 2, 2, 3), 1e308)
     blinding = SplineBrdf(TensorSpline((1, 1, 1), [[0, 0, 1, 1]] * 3, net), IN_OUT, Linear())
-    assert "float64" in refusal(lambda: make_plausible(blinding))
+    assert "float64" in refusal(lambda: make_plausible(blinding, negative=True))
 
 
 def test_a_check_tells_where_energy_is_created():
@@ -221,7 +221,7 @@ def test_repaired_materials_create_no_energy_anywhere(what):
     m = np.array(told.factors)
     assert (after <= before * (1 + 1e-9)).all()
     assert (after >= before * m.min(axis=0) ** 2 * (1 - 1e-6)).all()
-    again, nothing = make_plausible(repaired)
+    again, nothing = make_plausible(repaired, negative=True)
     assert again is repaired
     assert nothing.text() == "nothing to repair"
 
@@ -296,8 +296,8 @@ def test_negative_values_go_and_others_stay(chart):
     assert found.least_control <= found.lowest < 0
     place = [found.lowest_at[name] for name in chart.axes]
     assert len(place) == 3
-    assert "encoded values down to" in found.text()
-    repaired, told = make_plausible(model, energy=False)
+    assert "black where the spline is negative, down to" in found.text()
+    repaired, told = make_plausible(model, energy=False, negative=True)
     assert told.raised == 2
     assert told.raised_most <= 1.5
     moved = repaired.spline.control != model.spline.control
@@ -307,13 +307,13 @@ def test_negative_values_go_and_others_stay(chart):
     # Not all the way to zero: their neighbours carry them.
     assert repaired.spline.control[5, 4, 5, 1] < -0.01
     assert not check(repaired).negative
-    assert make_plausible(repaired)[0] is repaired
+    assert make_plausible(repaired, negative=True)[0] is repaired
 
 
 def test_a_net_below_zero_everywhere_becomes_black():
     net = np.full((4, 4, 4, 3), -1.0)
     model = SplineBrdf(TensorSpline((3, 3, 3), [clamped([], 3)] * 3, net), HALF_DIFF, Log())
-    repaired, told = make_plausible(model)
+    repaired, told = make_plausible(model, negative=True)
     assert (repaired.spline.control == 0).all()
     assert told.largest_change == 1
     assert check(repaired).plausible
@@ -327,11 +327,11 @@ def test_a_net_below_zero_everywhere_becomes_black():
 def test_after_a_repair_there_is_nothing_to_complain_about(chart, encoding, seed):
     model = _random(chart, encoding, seed)
     control = model.spline.control.copy()
-    repaired, told = make_plausible(model)
+    repaired, told = make_plausible(model, negative=True)
     np.testing.assert_array_equal(model.spline.control, control)
     found = check(repaired)
     assert found.plausible, found.text()
     assert (np.array(told.albedo_after) <= np.maximum(1, told.albedo_before)).all()
-    again, nothing = make_plausible(repaired)
+    again, nothing = make_plausible(repaired, negative=True)
     assert again is repaired
     assert nothing.largest_change == 0

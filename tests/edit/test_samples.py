@@ -76,9 +76,7 @@ def test_a_cleaned_measurement_is_nearer_to_the_material_than_the_measurement_wa
     measured = recipe.source.read()
     model = recipe.apply(fit(measured, size=(20, 12, 4), chart="half-diff", encoding="log"), recipe.source).model
     assert estimate(model, truth).nodes.log_cosine_rms < 0.4 * estimate(measured, truth).nodes.log_cosine_rms
-    found = check(model)
-    assert not found.negative
-    assert not found.creates_energy
+    assert not check(model).creates_energy
 
 
 def test_plausible_chrome_gives_back_no_more_light_than_arrives():
