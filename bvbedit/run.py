@@ -146,6 +146,8 @@ def attempt(job: Job, again: bool = False) -> Outcome:
         _make(recipe, job, outputs, key)
     except BvbError as error:
         return Outcome(str(job.source), "failed", (), perf_counter() - start, str(error))
+    except MemoryError:
+        return Outcome(str(job.source), "failed", (), perf_counter() - start, "Not enough memory. Run fewer jobs.")
     return Outcome(str(job.source), "made", paths, perf_counter() - start)
 
 

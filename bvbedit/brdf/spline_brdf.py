@@ -105,7 +105,9 @@ def keep_faces(control: Floats, chart: Chart) -> Floats:
     """
     out = np.array(control)
     for layers, across in _faces(out, chart):
-        layers[:] = layers.mean(axis=across, keepdims=True)
+        low, high = layers.min(axis=across, keepdims=True), layers.max(axis=across, keepdims=True)
+        # The mean of equal numbers may be another, by rounding.
+        layers[:] = np.where(low == high, low, layers.mean(axis=across, keepdims=True))
     return out
 
 

@@ -59,6 +59,7 @@ def edit_file(source: Path, target: Path, edits: "Sequence[Edit]", as_json: bool
     check_target(target, (".bvb",))
     document = Document.open(source)
     bytes_before = source.stat().st_size
+    steps = []
     with progress(f"Editing {source.name}") as watch:
         for n, each in enumerate(edits):
             try:
@@ -67,10 +68,18 @@ def edit_file(source: Path, target: Path, edits: "Sequence[Edit]", as_json: bool
                 raise BvbError(
                     f"{each.op}: {error}" if len(edits) == 1 else f"edit {n + 1} ({each.op}): {error}"
                 ) from None
+            told = document.model.report
+            error, notes = told.get("refit_error"), told.get("notes", [])
+            steps.append(
+                {"edit": each.line(), **({} if error is None else {"refit_error": error}), "notes": list(notes)}
+            )
             if watch is not None:
                 watch((n + 1) / len(edits))
     document.save(target, precision=precision)
-    report({**_told(document, target), "bytes_before": bytes_before, "bytes_after": target.stat().st_size}, as_json)
+    report(
+        {**_told(document, target), "steps": steps, "bytes_before": bytes_before, "bytes_after": target.stat().st_size},
+        as_json,
+    )
 
 
 def _told(document: "Document", target: Path) -> dict[str, Any]:
@@ -88,9 +97,8 @@ def _told(document: "Document", target: Path) -> dict[str, Any]:
         "size_after": list(document.model.spline.size),
         "degrees": list(document.model.spline.degrees),
         "max_change": changes.max_change,
-        **{key: told[key] for key in ("metrics", "refit_error") if key in told},
+        **({"metrics": told["metrics"]} if "metrics" in told else {}),
         "plausibility": {"before": was.text(), "after": now.text()},
-        "notes": list(told.get("notes", [])),
     }
     return result
 

@@ -6,7 +6,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from bvbedit.brdf.charts import HALF_DIFF
+from bvbedit.brdf.charts import HALF_DIFF, grid_points
 from bvbedit.brdf.geometry import Floats
 from bvbedit.brdf.plausibility import albedo
 from bvbedit.brdf.spline_brdf import SplineBrdf, face_spread, keep_faces
@@ -161,7 +161,8 @@ def colour_matrix(hue: float, saturation: float) -> Floats:
 class Broaden(Edit):
     """A broader highlight, by a map of half angles: tan theta_h grows by ``factor``.
 
-    That turns GGX or Beckmann lobes of roughness alpha into those of factor times alpha, but for their height. In the
+    That turns GGX or Beckmann lobes of roughness alpha into those of factor times alpha, but for their height, and for
+    shadowing, which moves along: half-widths are within 5 % up to alpha 0.16, and 10 % off at alpha 0.375. In the
     half-diff chart the knots are moved along, so that the lobe is met as well as it was.
     """
 
@@ -254,12 +255,18 @@ class RaiseGrazing(Edit):
     about: ClassVar[str] = "a brighter or darker edge"
 
     def apply(self, model: SplineBrdf) -> SplineBrdf:
-        grid = np.clip(np.stack(np.meshgrid(*model.spline.greville, indexing="ij"), axis=-1), 0.0, 1.0)
-        flat = np.ascontiguousarray(grid.reshape(-1, 3))
-        if model.chart is not HALF_DIFF:
-            flat = HALF_DIFF.to_parameters(*model.chart.to_directions(flat))
-        theta_d = np.radians(HALF_DIFF.angles(flat)[:, 1]).reshape(grid.shape[:-1])
-        return scaled(model, (1 + self.amount * (1 - np.cos(theta_d)) ** self.power)[..., None])
+        spline, encoding = model.spline, model.encoding
+
+        def factor(points: Floats) -> Floats:
+            if model.chart is not HALF_DIFF:
+                points = HALF_DIFF.to_parameters(*model.chart.to_directions(points))
+            theta_d = np.radians(HALF_DIFF.angles(points)[:, 1])
+            return np.asarray(1 + self.amount * (1 - np.cos(theta_d)) ** self.power)[:, None]
+
+        points = np.clip(grid_points(tuple(spline.greville)), 0.0, 1.0)
+        edited = scaled(model, factor(points).reshape(*spline.size, 1))
+        missed = distance(edited, lambda p: encoding.scaled(spline.evaluate_inside(p), factor(p)))
+        return edited.told(refit_error=missed)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -27,7 +27,7 @@ class Blend(Regional):
 
     op: Literal["blend"] = "blend"
     partner: Path = choice("the .bvb file of the other material")
-    t: float | Rgb = number(-10, 10, "share of the partner, or one for each of red, green and blue")
+    t: float | Rgb = number(-1000, 1000, "share of the partner, or one for each of red, green and blue")
     space: Literal["net", "linear", "log"] = choice("what is mixed: " + ", ".join(SPACES), default="net")
     about: ClassVar[str] = "a hint of another material, or all of it"
 

@@ -118,7 +118,7 @@ def test_a_share_for_each_channel(run, folder, grey, tmp_path):
         (("refine", "M", "OUT", "--axis", "0", "--at", "0.5", "--factor", "2"), "--at or --factor"),
         (("refine", "M", "OUT", "--axis", "0", "--at", "0.5,0.2"), "knot 1 to insert is 0.2"),
         (("refine", "M", "OUT", "--axis", "0", "--at", "1.5"), "1.5"),
-        (("refine", "M", "OUT", "--axis", "3", "--factor", "2"), "Axis 3"),
+        (("refine", "M", "OUT", "--axis", "3", "--factor", "2"), "axis is 3"),
         (("remove", "M", "OUT", "--axis", "0", "--tolerance", "-1"), "-1"),
         (("remove", "M", "OUT", "--axis", "0", "--tolerance", "nan"), "nan"),
         (("elevate", "M", "OUT", "--axis", "0", "--by", "14"), "14"),
