@@ -11,7 +11,10 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any, Literal
 
+import numpy as np
+
 from bvbedit.api import fit
+from bvbedit.brdf.albedo import albedo
 from bvbedit.brdf.spline_brdf import SplineBrdf
 from bvbedit.edit.combining import Blend
 from bvbedit.edit.recipe import Output, Recipe, Source, read_recipe
@@ -23,6 +26,8 @@ from bvbedit.io.files import reading
 
 # Where many materials are run, and the recipe names no file for each.
 EACH = Output("{name}.bvb")
+# Degrees at which the albedo of what was made is looked at.
+ELEVATIONS = range(0, 90, 3)
 
 
 @dataclass(frozen=True)
@@ -47,6 +52,8 @@ class Outcome:
     outputs: tuple[Path, ...] = ()
     seconds: float = 0.0
     error: str | None = None
+    notes: tuple[str, ...] = ()
+    """What a user should know: where energy is created, what the last step said."""
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as JSON can hold it."""
@@ -141,17 +148,18 @@ def attempt(job: Job, again: bool = False) -> Outcome:
         outputs = _outputs(recipe, job)
         paths = tuple(path for _, path in outputs)
         key = _key(recipe, job)
-        if not again and all(_is_current(path, key, recipe, job) for path in paths):
+        if not again and _are_current(paths, key):
             return Outcome(str(job.source), "up to date", paths, perf_counter() - start)
-        _make(recipe, job, outputs, key)
+        notes = _make(recipe, job, outputs, key)
     except BvbError as error:
         return Outcome(str(job.source), "failed", (), perf_counter() - start, str(error))
     except MemoryError:
         return Outcome(str(job.source), "failed", (), perf_counter() - start, "Not enough memory. Run fewer jobs.")
-    return Outcome(str(job.source), "made", paths, perf_counter() - start)
+    return Outcome(str(job.source), "made", paths, perf_counter() - start, notes=notes)
 
 
-def _make(recipe: Recipe, job: Job, outputs: Sequence[tuple[Output, Path]], key: str) -> None:
+def _make(recipe: Recipe, job: Job, outputs: Sequence[tuple[Output, Path]], key: str) -> tuple[str, ...]:
+    """Make the outputs, and return what a user should know."""
     source = job.source.read()
     model = source if isinstance(source, SplineBrdf) else fit(source, **_options(recipe))
     # Of another material than the recipe's own the digest says nothing.
@@ -159,11 +167,23 @@ def _make(recipe: Recipe, job: Job, outputs: Sequence[tuple[Output, Path]], key:
     document = asked.apply(model, job.source)
     if not isinstance(source, SplineBrdf):
         document = replace(document, source={**document.source, "fit": recipe.fit.to_dict()})
-    for output, path in outputs:
+    # Models first: tables are known to be done by being no older.
+    for output, path in sorted(outputs, key=lambda made: made[1].suffix.lower() != ".bvb"):
         if path.suffix.lower() == ".bvb":
             document.save(path, precision=output.precision, pdf=output.pdf, made=key)
         else:
             export(document.model, path)
+    theta = np.radians(list(ELEVATIONS))
+    seen = albedo(document.model, theta)
+    notes = [f"{edit.op}: {note}" for n, edit in enumerate(document.edits) for note in _notes(document.at(n + 1))]
+    if (seen.value > 1 + seen.error).any():
+        worst = int(np.argmax(seen.value.max(axis=1)))
+        notes.append(f"energy is created: albedo {seen.value[worst].max():.3g} at {ELEVATIONS[worst]} degrees")
+    return tuple(notes)
+
+
+def _notes(model: SplineBrdf) -> list[str]:
+    return list(model.report.get("notes", []))
 
 
 def _options(recipe: Recipe) -> dict[str, Any]:
@@ -206,16 +226,17 @@ def _sum(path: Path) -> str:
     return joined.hexdigest()
 
 
-def _is_current(path: Path, key: str, recipe: Recipe, job: Job) -> bool:
-    """Return whether an output is what the job would make: a model tells, a table is newer than its sources."""
-    if not path.exists():
-        return False
-    if path.suffix.lower() == ".bvb":
-        try:
-            return (load_recipe(path) or {}).get("made") == key
-        except BvbError:
+def _are_current(paths: Sequence[Path], key: str) -> bool:
+    """Return whether the outputs are what the job would make.
+
+    A model says what it was made of. A table cannot: it is current beside a model that is, and is not older. A job that
+    makes tables alone is never known to be done.
+    """
+    models = [path for path in paths if path.suffix.lower() == ".bvb"]
+    try:
+        if not models or not all(path.exists() and (load_recipe(path) or {}).get("made") == key for path in models):
             return False
-    partners = [edit.partner for edit in recipe.steps if isinstance(edit, Blend)]
-    sources = [path for path in (job.source.file, job.recipe, *partners) if path is not None]
-    newest = max(path.stat().st_mtime_ns for path in sources)
-    return not job.settings and not path.is_dir() and path.stat().st_mtime_ns > newest
+    except BvbError:
+        return False
+    oldest = min(path.stat().st_mtime_ns for path in models)
+    return all(path.exists() and path.stat().st_mtime_ns >= oldest for path in paths)

@@ -288,12 +288,20 @@ def test_what_is_up_to_date_is_left_alone_until_something_changes(home):
     assert run(jobs_of(path), again=True)[0].status == "made"
 
 
-def test_a_table_is_up_to_date_while_it_is_newer_than_its_source_and_recipe(home):
-    path = write(home, LOOK.replace("{name}-warm.bvb", "warm.npz"))
+def test_a_table_is_up_to_date_beside_a_model_that_is(home):
+    path = write(home, LOOK + '\n[[outputs]]\nfile = "warm.npz"\n')
     assert made(path) == ["made"]
     assert made(path) == ["up to date"]
-    later = (home / "warm.npz").stat().st_mtime_ns + 10**9
-    os.utime(home / "gold.bvb", ns=(later, later))
+    earlier = (home / "gold-warm.bvb").stat().st_mtime_ns - 10**9
+    os.utime(home / "warm.npz", ns=(earlier, earlier))
+    assert made(path) == ["made"]
+    (home / "warm.npz").unlink()
+    assert made(path) == ["made"]
+
+
+def test_tables_alone_are_always_made_for_they_cannot_tell_what_of(home):
+    path = write(home, LOOK.replace("{name}-warm.bvb", "warm.npz"))
+    assert made(path) == ["made"]
     assert made(path) == ["made"]
 
 

@@ -157,15 +157,15 @@ def check(model: SplineBrdf) -> Plausibility:
 
 
 def make_plausible(
-    model: SplineBrdf, *, energy: bool = True, negative: bool = False, reciprocity: bool = True
+    model: SplineBrdf, *, energy: bool = True, colour: bool = True, negative: bool = False, reciprocity: bool = True
 ) -> tuple[SplineBrdf, Repair]:
     """Return the model with what is asked for repaired by a small change, and what was changed.
 
     ``reciprocity``: an ``in-out`` net is averaged with its transpose, over common knots. ``energy``: f m(theta_i)
-    m(theta_o) takes the place of f, with m <= 1 such that the albedo is at most 1. ``negative``: control points are
-    raised towards zero where the spline is below it; not by default, for reflectance is zero there already, and where a
-    net dives far below zero beside a mirror's peak, raising it changes the look by much. A model that needs nothing is
-    returned as it is.
+    m(theta_o) takes the place of f, with m <= 1 such that the albedo is at most 1; the same m for all channels if the
+    ``colour`` is to stay. ``negative``: control points are raised towards zero where the spline is below it; not by
+    default, for reflectance is zero there already, and where a net dives far below zero beside a mirror's peak, raising
+    it changes the look by much. A model that needs nothing is returned as it is.
     Raises BvbError for what is no SplineBrdf, and for albedos beyond float64.
     """
     check_spline_brdf(model)
@@ -184,7 +184,7 @@ def make_plausible(
             up = edited.spline.control - before.spline.control
             count, most = max(count, int(np.count_nonzero(up))), max(most, float(up.max()))
         if energy:
-            edited, more = dimmed(edited)
+            edited, more = dimmed(edited, colour=colour)
             factors = factors * more
         if edited is before:
             break

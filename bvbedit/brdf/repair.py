@@ -152,12 +152,13 @@ def creates(value: Floats, error: Floats) -> Bools:
     return np.asarray(value > 1 + error)
 
 
-def dimmed(model: SplineBrdf) -> tuple[SplineBrdf, Floats]:
+def dimmed(model: SplineBrdf, *, colour: bool = False) -> tuple[SplineBrdf, Floats]:
     """Return the model f m(theta_i) m(theta_o) whose albedo is at most 1, and m (n, 3) of each channel.
 
     m <= 1 stands at the Greville abscissae of axis 1, times pi/2, linear in between; a control point is multiplied by
-    what belongs to the pair of directions at its own. m is found by damped steps, as Sinkhorn & Knopp (1967) balance a
-    matrix: it falls where an albedo near by is above 1, and rises, up to 1, where none is.
+    what belongs to the pair of directions at its own. ``colour``: m is the same for all channels. m is found by damped
+    steps, as Sinkhorn & Knopp (1967) balance a matrix: it falls where an albedo near by is above 1, and rises, up to 1,
+    where none is.
     The same model where the albedo is nowhere above 1 by more than the quadrature's rounding.
     Raises BvbError for albedos that are not finite.
     """
@@ -180,6 +181,8 @@ def dimmed(model: SplineBrdf) -> tuple[SplineBrdf, Floats]:
 
     for step in range(SETTLING):
         value = seen.value if step == 0 else albedo_value(applied(m), ELEVATIONS, COARSE, kept)
+        if colour:
+            value = np.broadcast_to(value.max(axis=1, keepdims=True), value.shape)
         last, m = m, _balanced(m, value, near[len(value)], DAMPING, rising=True)
         if np.abs(np.log(m / last)).max() < SETTLED:
             break
@@ -190,10 +193,13 @@ def dimmed(model: SplineBrdf) -> tuple[SplineBrdf, Floats]:
             value = albedo_value(edited, WATCHED, kept=kept)
             if (value <= ENOUGH).all():
                 return edited, m
+        if colour:
+            value = np.broadcast_to(value.max(axis=1, keepdims=True), value.shape)
         m = _balanced(m, value, near[len(value)], DAMPING * LONGER**step, rising=False)
     # Nets too coarse to tell elevations apart: the whole material.
     while (value := albedo_value(applied(m), WATCHED, kept=kept)).max() > ENOUGH:
-        m = m * np.where(value.max(axis=0) > ENOUGH, np.sqrt(GOAL / value.max(axis=0)), 1.0)
+        most = np.full(3, value.max()) if colour else value.max(axis=0)
+        m = m * np.where(most > ENOUGH, np.sqrt(GOAL / most), 1.0)
     return applied(m), m
 
 

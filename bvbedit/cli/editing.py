@@ -17,20 +17,16 @@ MOST_JOBS = 256
 
 
 def edit(
-    source: Path,
-    target: Path,
+    source: Path | None = None,
+    target: Path | None = None,
     /,
     *,
-    op: Annotated[list[str], Parameter(negative="")],
+    op: Annotated[list[str] | None, Parameter(negative="")] = None,
+    operations: Annotated[bool, Parameter(negative="")] = False,
     precision: str | None = None,
     as_json: Json = False,
 ) -> None:
-    """Edit a model in words, like --op "tint rgb=1,0.8,0.6 theta_h=0..20"; bvbedit edit --help lists the operations.
-
-    gain factor | tint rgb or hue, saturation | broaden, sharpen factor keep_energy | raise_grazing amount power |
-    denoise strength | blend partner t space | move_points at rgb | make_plausible | insert_knots, refine,
-    remove_knots, elevate, reduce axis. Regions are theta_h, theta_d, phi_d, theta_i, theta_o, phi=FROM..TO in degrees,
-    with falloff; part is all, body or highlight.
+    """Edit a model in words, like --op "tint rgb=1,0.8,0.6 theta_h=0..20"; --operations lists what can be done.
 
     Parameters
     ----------
@@ -39,14 +35,22 @@ def edit(
     target
         The .bvb file to write; it keeps the history.
     op
-        An edit; give --op again for each further one.
+        An edit, in quotes; give --op again for each further one.
+    operations
+        List the operations with their parameters, limits and defaults.
     precision
         float16, float32, float64 or quantised, in place of the model's own.
     as_json
         Print one JSON object.
     """
-    from bvbedit.edit.operations import edit_of_line
+    from bvbedit.edit.operations import edit_of_line, overview
+    from bvbedit.errors import BvbError
 
+    if operations:
+        print(overview())
+        return
+    if source is None or target is None or not op:
+        raise BvbError('Nothing to do. Write it like: bvbedit edit IN.bvb OUT.bvb --op "gain factor=1.5"')
     edit_file(source, target, [edit_of_line(line) for line in op], as_json, precision)
 
 
@@ -58,6 +62,8 @@ def edit_file(source: Path, target: Path, edits: "Sequence[Edit]", as_json: bool
 
     check_target(target, (".bvb",))
     document = Document.open(source)
+    if target.resolve() == source.resolve() and not document.past:
+        raise BvbError(f"{target} is where the history begins, and would be lost. Write to another file.")
     bytes_before = source.stat().st_size
     steps = []
     with progress(f"Editing {source.name}") as watch:
@@ -69,9 +75,9 @@ def edit_file(source: Path, target: Path, edits: "Sequence[Edit]", as_json: bool
                     f"{each.op}: {error}" if len(edits) == 1 else f"edit {n + 1} ({each.op}): {error}"
                 ) from None
             told = document.model.report
-            error, notes = told.get("refit_error"), told.get("notes", [])
+            missed, notes = told.get("refit_error"), told.get("notes", [])
             steps.append(
-                {"edit": each.line(), **({} if error is None else {"refit_error": error}), "notes": list(notes)}
+                {"edit": each.line(), **({} if missed is None else {"refit_error": missed}), "notes": list(notes)}
             )
             if watch is not None:
                 watch((n + 1) / len(edits))
@@ -158,13 +164,22 @@ def run(
     else:
         width = max(len(Path(o.source).name) for o in outcomes)
         for o in outcomes:
-            what = o.error if o.status == "failed" else ", ".join(str(path) for path in o.outputs)
+            what = (
+                o.error if o.status == "failed" else "; ".join([", ".join(str(path) for path in o.outputs), *o.notes])
+            )
             print(f"{Path(o.source).name:<{width}}  {o.status:<10}  {o.seconds:6.2f} s  {what}")
     if failed:
         raise BvbError(f"{len(failed)} of {len(outcomes)} could not be made: {failed[0].source}: {failed[0].error}")
 
 
-def history(source: Path, /, *, recipe: Annotated[bool, Parameter(negative="")] = False, as_json: Json = False) -> None:
+def history(
+    source: Path,
+    /,
+    *,
+    recipe: Annotated[bool, Parameter(negative="")] = False,
+    until: int | None = None,
+    as_json: Json = False,
+) -> None:
     """Tell how a model came about.
 
     Parameters
@@ -172,7 +187,9 @@ def history(source: Path, /, *, recipe: Annotated[bool, Parameter(negative="")] 
     source
         The .bvb model.
     recipe
-        Print a recipe in TOML that makes the same model again.
+        Print a recipe in TOML that makes the same model again; bvbedit run makes it.
+    until
+        The first so many steps only: the way back to before the others.
     as_json
         Print one JSON object.
     """
@@ -189,6 +206,11 @@ def history(source: Path, /, *, recipe: Annotated[bool, Parameter(negative="")] 
         if recipe:
             raise BvbError(f"{source} has no history: it was fitted or saved without one. Edit it first.")
         told = {"source": dict(document.source), "steps": []}
+    if until is not None:
+        if not 0 <= until <= len(told["steps"]):
+            raise BvbError(f"--until is {until}. The history has {len(told['steps'])} steps: give 0 up to that.")
+        told = {**told, "steps": told["steps"][:until]}
+        told.pop("names", None)
     if recipe:
         # Seen from the file's own folder, in which a recipe is best put.
         kept = {key: value for key, value in told.items() if key != "made"}

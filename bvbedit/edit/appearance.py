@@ -178,13 +178,15 @@ class Broaden(Edit):
 
     def apply(self, model: SplineBrdf) -> SplineBrdf:
         body = None if self.part == "all" else body_of(model)
+        gain = 1.0
 
         def encoded(points: Floats) -> Floats:
             moved = self._moved(model, points)
+            y = model.spline.evaluate_inside(moved)
             if body is None:
-                return model.spline.evaluate_inside(moved)
-            f = model.encoding.decode(model.spline.evaluate_inside(moved))
-            return model.encoding.encode(body(points) + np.maximum(f - body(moved), 0.0))
+                return y
+            highlight = np.maximum(model.encoding.decode(y) - body(moved), 0.0)
+            return model.encoding.encode(body(points) + gain * highlight)
 
         knots = list(model.spline.knots)
         if model.chart is HALF_DIFF:
@@ -193,12 +195,18 @@ class Broaden(Edit):
         edited = resampled(model, encoded, knots)
         if not self.keep_energy:
             return edited
-        before, after = (albedo(m, ELEVATIONS).value.mean(axis=0) for m in (model, edited))
-        gain = np.divide(before, after, out=np.ones(3), where=after > 0)
-        error = edited.report["refit_error"]
-        return scaled(edited, np.broadcast_to(gain, (1, 1, 1, 3))).told(
-            refit_error=error, notes=[f"times {', '.join(f'{g:.3g}' for g in gain)} to keep the mean albedo"]
-        )
+        below = 0.0
+        if body is not None:
+            below = _energy(resampled(model, lambda points: model.encoding.encode(body(points))))
+        before, after = _energy(model) - below, _energy(edited) - below
+        # One factor for all channels: the highlight keeps its colour.
+        gain = before / after if before > 0 and after > 0 else 1.0
+        if body is None:
+            error = edited.report["refit_error"]
+            kept = scaled(edited, np.full((1, 1, 1, 1), gain))
+            return kept.told(refit_error=error, notes=[f"times {gain:.3g}, to keep the mean albedo"])
+        note = f"the highlight times {gain:.3g}, to keep the mean albedo"
+        return resampled(model, encoded, knots).told(notes=[note])
 
     def _moved(self, model: SplineBrdf, points: Floats) -> Floats:
         """Return the parameters whose values come to stand at ``points``."""
@@ -209,6 +217,11 @@ class Broaden(Edit):
         if model.chart is HALF_DIFF:
             return halves
         return model.chart.to_parameters(*HALF_DIFF.to_directions(halves))
+
+
+def _energy(model: SplineBrdf) -> float:
+    """Return the luminance of the mean albedo."""
+    return float(albedo(model, ELEVATIONS).value.mean(axis=0) @ LUMINANCE)
 
 
 def _check_highlight(part: Part) -> None:

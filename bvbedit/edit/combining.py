@@ -8,14 +8,16 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from bvbedit.brdf.blend import SPACES, blend
-from bvbedit.brdf.geometry import spherical
+from bvbedit.brdf.geometry import Floats, spherical
 from bvbedit.brdf.plausibility import make_plausible
 from bvbedit.brdf.spline_brdf import SplineBrdf
 from bvbedit.edit.appearance import Regional, Rgb, face_projection
 from bvbedit.edit.operation import Edit
 from bvbedit.edit.parameters import choice, number
+from bvbedit.edit.resampling import Encoded, resampled
 from bvbedit.errors import BvbError
 from bvbedit.io import load
+from bvbedit.spline.compatible import make_compatible
 from bvbedit.spline.sculpting import move_points
 
 LARGEST_REFLECTANCE = 1e5
@@ -28,7 +30,11 @@ class Blend(Regional):
     op: Literal["blend"] = "blend"
     partner: Path = choice("the .bvb file of the other material")
     t: float | Rgb = number(-1000, 1000, "share of the partner, or one for each of red, green and blue")
-    space: Literal["net", "linear", "log"] = choice("what is mixed: " + ", ".join(SPACES), default="net")
+    space: Literal["auto", "net", "linear", "log"] = choice(
+        "what is mixed: control points (net), reflectance (linear) or its logarithm (log); auto is net where both nets "
+        "are alike and all is mixed, else linear",
+        default="auto",
+    )
     about: ClassVar[str] = "a hint of another material, or all of it"
 
     def with_partner(self) -> SplineBrdf:
@@ -40,10 +46,34 @@ class Blend(Regional):
 
     def apply(self, model: SplineBrdf) -> SplineBrdf:
         other = self.with_partner()
-        if self.everywhere:
-            return blend(model, other, self.t, self.space)
-        shares = self.net_weights(model)[..., None] * np.atleast_1d(np.asarray(self.t, dtype=np.float64))
-        return blend(model, other, model.spline.with_control(shares), self.space)
+        alike = model.chart is other.chart and model.encoding == other.encoding
+        space = ("net" if alike and self.everywhere else "linear") if self.space == "auto" else self.space
+        exact = space == "net" or (alike and model.encoding == SPACES[space])
+        if self.everywhere and exact:
+            return blend(model, other, self.t, space)
+        if space == "net" and not alike:
+            raise BvbError("The nets are of other charts or encodings and cannot be mixed. Choose space linear or log.")
+        # Over the knots of both, that the partner's highlight is met as well; in another chart they mean nothing.
+        united = make_compatible(model.spline, other.spline)[0][0] if model.chart is other.chart else model.spline
+        return resampled(model.with_spline(united), self._mixture(model, other, space))
+
+    def _mixture(self, model: SplineBrdf, other: SplineBrdf, space: str) -> Encoded:
+        """Return the encoded values (n, 3) of the mixture at parameters (n, 3) of the model's chart."""
+        between = SPACES[space] or model.encoding
+
+        def encoded(points: Floats) -> Floats:
+            y = model.spline.evaluate_inside(points)
+            if model.chart is other.chart:
+                partner = other.encoding.decode(other.spline.evaluate_inside(points))
+            else:
+                partner = other.evaluate_unit(*model.chart.to_directions(points))[0]
+            share = self.weights(model.chart, points)[:, None] * np.atleast_1d(np.asarray(self.t, dtype=np.float64))
+            a, b = between.encode(model.encoding.decode(y)), between.encode(partner)
+            mixed = model.encoding.encode(between.decode((1 - share) * a + share * b))
+            # Where nothing is mixed in, and the spline is below zero, it stays.
+            return np.where(share == 0, y, mixed + np.minimum(y, 0.0) * np.clip(1 - share, 0.0, 1.0))
+
+        return encoded
 
     def to_dict(self) -> dict[str, object]:
         return {**super().to_dict(), "partner": fspath(self.partner)}
@@ -88,10 +118,13 @@ class MakePlausible(Edit):
 
     op: Literal["make_plausible"] = "make_plausible"
     energy: bool = choice("no more light leaves than arrives", default=True)
+    colour: bool = choice("all channels by the same factor, so that the colour stays", default=True)
     negative: bool = choice("raise the net where it is below zero and reflectance is zero", default=False)
     reciprocity: bool = choice("the same in both directions", default=True)
     about: ClassVar[str] = "no more light than arrives, the same in both directions"
 
     def apply(self, model: SplineBrdf) -> SplineBrdf:
-        edited, repair = make_plausible(model, energy=self.energy, negative=self.negative, reciprocity=self.reciprocity)
+        edited, repair = make_plausible(
+            model, energy=self.energy, colour=self.colour, negative=self.negative, reciprocity=self.reciprocity
+        )
         return edited.told(notes=[repair.text()])

@@ -9,10 +9,12 @@ import shlex
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields
-from typing import Any, ClassVar
+from functools import cache
+from typing import Any, ClassVar, Literal, get_args, get_origin, get_type_hints
 
 from bvbedit.brdf.spline_brdf import SplineBrdf
 from bvbedit.edit.parameters import check_numbers
+from bvbedit.errors import BvbError
 from bvbedit.spline.arguments import shown
 
 
@@ -28,6 +30,9 @@ class Edit(ABC):
 
     def __post_init__(self) -> None:
         check_numbers(self)
+        for name, allowed in _choices(type(self)).items():
+            if getattr(self, name) not in allowed:
+                raise BvbError(f"{name} is {shown(getattr(self, name))}. Choose one of {', '.join(allowed)}.")
 
     @abstractmethod
     def apply(self, model: SplineBrdf) -> SplineBrdf:
@@ -51,6 +56,13 @@ class Edit(ABC):
         words = [given.pop("op")]
         words += [f"{name}={shlex.quote(_written(name, value))}" for name, value in given.items()]
         return " ".join(words)
+
+
+@cache
+def _choices(kind: type) -> Mapping[str, tuple[str, ...]]:
+    """Return what the fields of an edit's class may be that are one of several texts."""
+    hints = get_type_hints(kind)
+    return {f.name: get_args(hints[f.name]) for f in fields(kind) if get_origin(hints[f.name]) is Literal}
 
 
 # Parameters that are intervals of angles.

@@ -1,12 +1,14 @@
 """The closed set of edits, by their names."""
 
 from collections.abc import Mapping
+from dataclasses import MISSING, Field, fields
 from functools import cache
 from typing import Annotated, Any
 
 from bvbedit.edit.appearance import Broaden, Denoise, Gain, RaiseGrazing, Sharpen, Tint
 from bvbedit.edit.combining import Blend, MakePlausible, MovePoints
 from bvbedit.edit.operation import Edit, words_of
+from bvbedit.edit.region import Region
 from bvbedit.edit.structural import Elevate, InsertKnots, Reduce, Refine, RemoveKnots, Store
 from bvbedit.errors import BvbError
 from bvbedit.spline.arguments import shown
@@ -71,3 +73,31 @@ def edit_of_line(line: str) -> Edit:
         return edit_of(words)
     except BvbError as error:
         raise BvbError(f"{shown(line)}: {error}") from None
+
+
+def overview() -> str:
+    """Return a text for people: each operation with what it does, its parameters, their limits and defaults."""
+    regional = {f.name for f in fields(Region)}
+    out = []
+    for op, kind in OPERATIONS.items():
+        out.append(f"{op}: {kind.about}")
+        for f in fields(kind):
+            if f.name not in (*regional, "op", "label"):
+                out.append(f"    {f.name:<12} {_described(f)}")
+        if issubclass(kind, Region):
+            out.append("    and a region")
+    out.append("a region: angles FROM..TO; outside, the effect ends softly over falloff")
+    out += [f"    {f.name:<12} {_described(f)}" for f in fields(Region)]
+    return "\n".join(out)
+
+
+def _described(f: "Field[Any]") -> str:
+    limits = f.metadata.get("limits")
+    about = str(limits.about if limits else f.metadata["about"])
+    if limits:
+        about += f", {limits.low:g} ... {limits.high:g}{' ' + limits.unit if limits.unit else ''}"
+    if f.default is MISSING:
+        return f"{about} (needed)"
+    if f.default is None:
+        return about
+    return f"{about} ({str(f.default).lower() if isinstance(f.default, bool) else f.default})"

@@ -59,7 +59,7 @@ def _model(what: str) -> SplineBrdf:
 
 @functools.cache
 def _repaired(what: str):
-    return make_plausible(_model(what), negative=True)
+    return make_plausible(_model(what), colour=False, negative=True)
 
 
 def _scaled(model: SplineBrdf, factor: float) -> SplineBrdf:
@@ -335,3 +335,15 @@ def test_after_a_repair_there_is_nothing_to_complain_about(chart, encoding, seed
     again, nothing = make_plausible(repaired, negative=True)
     assert again is repaired
     assert nothing.largest_change == 0
+
+
+def test_the_colour_stays_unless_channels_are_dimmed_apart():
+    coloured = _scaled(_model("rough"), 1.3)
+    red = coloured.with_spline(coloured.spline.with_control(coloured.spline.control * [1.3, 1.0, 0.8]))
+    whole, apart = (make_plausible(red, colour=colour)[0] for colour in (True, False))
+    assert check(whole).plausible
+    assert check(apart).plausible
+    ratio = whole.spline.control / np.where(red.spline.control == 0, 1.0, red.spline.control)
+    assert np.ptp(ratio, axis=-1).max() < 1e-9
+    factors = apart.spline.control / np.where(red.spline.control == 0, 1.0, red.spline.control)
+    assert np.ptp(factors, axis=-1).max() > 0.05

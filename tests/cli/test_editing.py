@@ -94,11 +94,13 @@ def test_without_json_a_short_table_is_printed(run, home):
 
 
 def test_a_file_may_be_edited_in_place_and_in_another_precision(run, home):
-    path = home / "gold.bvb"
+    path = home / "edited.bvb"
+    assert "would be lost" in refused(run("edit", home / "gold.bvb", home / "gold.bvb", "--op", "gain factor=2"))
+    run("edit", home / "gold.bvb", path, "--op", "gain factor=2")
     for precision in ("float16", "quantised", "float64"):
         told(run("edit", path, path, "--op", "gain factor=1.5", "--precision", precision, "--json"))
         assert bvbedit.load(path).storage.precision == precision
-    assert [step["op"] for step in load_recipe(path)["steps"]] == ["gain", "store"] * 2 + ["gain"]
+    assert [step["op"] for step in load_recipe(path)["steps"]] == ["gain", "store"] * 3 + ["gain"]
 
 
 def test_the_storage_of_a_file_is_kept(run, home):
@@ -144,14 +146,27 @@ def test_a_failed_edit_in_place_leaves_the_file(run, home):
     assert (home / "gold.bvb").read_bytes() == before
 
 
-def test_without_an_edit_it_is_wrong_usage(run, home):
-    status, out, _ = run("edit", home / "gold.bvb", home / "b.bvb")
-    assert (status, out) == (2, "")
+def test_without_an_edit_there_is_nothing_to_do(run, home):
+    assert "Nothing to do" in refused(run("edit", home / "gold.bvb", home / "b.bvb"))
 
 
-def test_help_lists_all_operations(run):
-    _, out, _ = run("edit", "--help")
-    assert all(name in out for name in OPERATIONS if name != "store")
+def test_all_operations_are_listed_with_their_parameters(run):
+    status, out, err = run("edit", "--operations")
+    assert (status, err) == (0, "")
+    for op, kind in OPERATIONS.items():
+        assert f"{op}: {kind.about}" in out
+    assert "hue          turn of the hue, -180 ... 180 degrees (0.0)" in out
+    assert "factor       how many times as bright, 0 ... 1e+06 (needed)" in out
+
+
+def test_the_first_steps_of_a_history_are_the_way_back(run, home):
+    target = home / "edited.bvb"
+    run("edit", home / "gold.bvb", target, "--op", "gain factor=2", "--op", "tint hue=20", "--precision", "float64")
+    run("edit", home / "gold.bvb", home / "half.bvb", "--op", "gain factor=2", "--precision", "float64")
+    (home / "again.toml").write_text(run("history", target, "--recipe", "--until", "1")[1])
+    told(run("run", home / "again.toml", "--json"))
+    assert digest(bvbedit.load(home / "edited-again.bvb")) == digest(bvbedit.load(home / "half.bvb"))
+    assert "has 2 steps" in refused(run("history", target, "--until", "3"))
 
 
 # ------------------------------------------------------------------------------------------------- run

@@ -80,8 +80,7 @@ def test_an_edit_beyond_the_storage_of_the_file_is_refused(run, folder, tmp_path
 
 def test_a_file_may_be_edited_in_place(run, folder, tmp_path):
     path = tmp_path / "model.bvb"
-    path.write_bytes((folder / "satin.bvb").read_bytes())
-    assert run("refine", path, path, "--axis", "0", "--factor", "2")[0] == 0
+    assert run("refine", folder / "satin.bvb", path, "--axis", "0", "--factor", "2")[0] == 0
     told = json.loads(run("remove", path, path, "--axis", "0", "--tolerance", "1e-5", "--json")[1])
     assert told["size_after"] == list(bvbedit.load(folder / "satin.bvb").spline.size)
 

@@ -118,7 +118,7 @@ def test_settings_of_what_has_no_steps_are_refused(steps, write):
     ("old", "new", "words"),
     [
         ("t = 0.25", "t = nan", ("line 19", "steps[2].t is nan")),
-        ("t = 0.25", "t = 11", ("line 16", "t is 11", "-10 ... 10")),
+        ("t = 0.25", "t = 1001", ("line 16", "t is 1001", "-1000 ... 1000")),
         ("t = 0.25", 't = "half"', ("line 19", "steps[2].t is 'half'")),
         ("t = 0.25", "", ("line 16", "steps[2].t is missing")),
         ("t = 0.25", "t = 0.25\nspce = 1", ("line 20", "steps[2].spce is not known. Did you mean space?")),

@@ -273,7 +273,7 @@ def test_a_report_longer_than_would_be_read_is_not_written(monkeypatch):
 def test_a_report_that_is_no_json_is_not_written(entry, tmp_path):
     m = files.model()
     spoiled = SplineBrdf(m.spline, m.chart, m.encoding, {"a": entry})
-    with pytest.raises(BvbError, match="report is no JSON") as refusal:
+    with pytest.raises(BvbError, match="report or recipe is no JSON") as refusal:
         bvbedit.save(spoiled, tmp_path / "m.bvb")
     assert "\n" not in str(refusal.value)
     assert list(tmp_path.iterdir()) == []
