@@ -1,4 +1,4 @@
-"""The whole job on a sample made on the spot: measure, fit, compare, render; pictures and a report stay in a folder."""
+"""The whole job on a sample made on the spot: measure, fit, edit, render, compare; all of it stays in a folder."""
 
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,7 @@ FITS: dict[str, tuple[str, dict[str, Any]]] = {
     ),
     "adaptive": ("automatic, up to 16 KiB", {"max_bytes": 16 * 1024}),
 }
+EDITS = ("broaden factor=2.5 part=highlight", "tint hue=-25 saturation=1.5")
 PICTURE: dict[str, Any] = {"width": 320, "height": 320, "spp": 64}
 # Differences are made visible by a power of two, so that one pixel in a hundred is as bright as can be.
 LARGEST_AMPLIFICATION = 128
@@ -29,7 +30,7 @@ FLOOR_STRIDE = 3
 
 
 def demo(*, out: Path = Path("bvbedit-demo"), as_json: Json = False) -> None:
-    """Measure a sample material, fit it twice, compare, render, and leave a report with pictures.
+    """Measure a sample material, fit it twice, edit, compare, render, and leave a report with pictures.
 
     Parameters
     ----------
@@ -79,10 +80,11 @@ def demo(*, out: Path = Path("bvbedit-demo"), as_json: Json = False) -> None:
         for name, brdf in {"measured": measured, **models}.items()
     }
     errors = _pictures(out, material.brdf, measured, models)
+    edited = _edited(out, models["adaptive"])
     missing = _screenshot(out, measured, models["adaptive"])
     with replacing(out / "report.md") as stream:
         table_bytes = (out / f"{MATERIAL}.binary").stat().st_size
-        stream.write(_report(material.description, table_bytes, rows, truth, errors, missing).encode())
+        stream.write(_report(material.description, table_bytes, rows, truth, errors, edited, missing).encode())
     report(
         {
             "folder": str(out),
@@ -136,6 +138,30 @@ def _pictures(out: Path, truth: Any, measured: Any, models: dict[str, Any]) -> d
     return {name: asdict(compare_pictures(pictures[name], pictures["truth"])) for name in shown}
 
 
+def _edited(out: Path, model: Any) -> list[str]:
+    """Edit a model, save it with its history, render each state, and return what was done and what physics says."""
+    from bvbedit import api
+    from bvbedit.edit.document import Document
+    from bvbedit.edit.operations import edit_of_line
+    from bvbedit.io.png import write_png
+    from bvbedit.render.sheet import sheet
+    from bvbedit.render.tonemap import tone_map
+
+    document = Document.of(model, file="adaptive.bvb")
+    for line in EDITS:
+        _tell(f"Editing: {line}")
+        document = document.do(edit_of_line(line))
+    document.save(out / "edited.bvb")
+    labels = ["adaptive", *EDITS]
+    pictures = [
+        (label, tone_map(api.render(document.at(n), "sphere", density=model.density, **PICTURE)))
+        for n, label in enumerate(labels)
+    ]
+    write_png(out / "edited.png", sheet(pictures, columns=len(pictures)))
+    before, after = document.changes().plausibility()
+    return [f"Before: {before.text()}.", f"After: {after.text()}."]
+
+
 def _screenshot(out: Path, measured: Any, model: Any) -> str:
     """Draw volume and lobes where OpenGL allows it; return why not where it does not."""
     import bvbedit_gui
@@ -155,6 +181,7 @@ def _report(
     rows: dict[str, Any],
     truth: dict[str, float],
     errors: dict[str, Any],
+    edited: list[str],
     missing: str,
 ) -> str:
     def row(label: str, measured: str, values: list[str]) -> str:
@@ -209,6 +236,14 @@ def _report(
         "- Pictures are compared as 8-bit sRGB, from 0 to 1: mean and largest difference (MAE, PAE), signal to noise.",
         "",
         "![measurement, models and their differences from the material](comparison.png)",
+        "",
+        "Then the adaptive model is edited; [edited.bvb](edited.bvb) keeps the history, which `bvbedit history` tells:",
+        "",
+        *(f"{n}. `{line}`" for n, line in enumerate(EDITS, 1)),
+        "",
+        "![the adaptive model before and after each edit](edited.png)",
+        "",
+        *edited,
         "",
     ]
     if missing:

@@ -124,7 +124,7 @@ class Tint(Regional):
 
     op: Literal["tint"] = "tint"
     rgb: Rgb | None = number(0, LARGEST_GAIN, "factors of red, green and blue, linear", default=None)
-    hue: float = number(-180, 180, "turn of the hue", unit="degrees", default=0.0)
+    hue: float = number(-180, 180, "turn of the hue, from red to yellow to green", unit="degrees", default=0.0)
     saturation: float = number(0, 10, "0 is grey, 1 leaves the colour", default=1.0)
     part: Part = choice(PART, default="all")
     about: ClassVar[str] = "warmer, cooler, greyer, of another hue"
@@ -153,7 +153,7 @@ def colour_matrix(hue: float, saturation: float) -> Floats:
     b = np.cross(a, LUMINANCE)
     basis = np.stack([np.ones(3), a / np.linalg.norm(a), b / np.linalg.norm(b)], axis=1)
     c, s = np.cos(np.radians(hue)), np.sin(np.radians(hue))
-    turn = basis @ np.array([[1, 0, 0], [0, c, -s], [0, s, c]]) @ np.linalg.inv(basis)
+    turn = basis @ np.array([[1, 0, 0], [0, c, s], [0, -s, c]]) @ np.linalg.inv(basis)
     return np.asarray(grey + saturation * (turn - grey))
 
 

@@ -249,5 +249,7 @@ def test_demo_does_the_whole_job(run, tmp_path, monkeypatch):
     assert err == ""  # no terminal, no progress
     told = one_object(printed)
     assert status == 0
-    assert {"report.md", "comparison.png", "paper.bvb", "adaptive.bvb"} <= set(told["files"])
+    assert {"report.md", "comparison.png", "edited.png", "paper.bvb", "adaptive.bvb", "edited.bvb"} <= set(
+        told["files"]
+    )
     assert "| log-cosine RMS, grid |" in Path(told["report"]).read_text()

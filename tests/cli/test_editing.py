@@ -155,7 +155,7 @@ def test_all_operations_are_listed_with_their_parameters(run):
     assert (status, err) == (0, "")
     for op, kind in OPERATIONS.items():
         assert f"{op}: {kind.about}" in out
-    assert "hue          turn of the hue, -180 ... 180 degrees (0.0)" in out
+    assert "hue          turn of the hue, from red to yellow to green, -180 ... 180 degrees (0.0)" in out
     assert "factor       how many times as bright, 0 ... 1e+06 (needed)" in out
 
 

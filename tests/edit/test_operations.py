@@ -17,7 +17,7 @@ from bvbedit.brdf.measured import MeasuredBrdf
 from bvbedit.brdf.plausibility import albedo, check, make_plausible
 from bvbedit.brdf.spline_brdf import keep_faces
 from bvbedit.brdf.storage import Storage
-from bvbedit.edit.appearance import ELEVATIONS, Broaden, Denoise, Gain, RaiseGrazing, Sharpen, Tint
+from bvbedit.edit.appearance import ELEVATIONS, Broaden, Denoise, Gain, RaiseGrazing, Sharpen, Tint, colour_matrix
 from bvbedit.edit.combining import Blend, MakePlausible, MovePoints
 from bvbedit.edit.operations import KINDS, OPERATIONS, edit_of, edit_of_line
 from bvbedit.edit.parts import body_of
@@ -711,3 +711,11 @@ def test_materials_of_any_chart_may_be_blended_again_and_again(space, tmp_path):
     f, a, b = (m.evaluate(wi, wo) for m in (mixed, one, other))
     np.testing.assert_allclose(f[(a > 0.01) & (b > 0.01)].mean(), (0.375 * a + 0.625 * b).mean(), rtol=0.2)
     assert mixed.spline.size == one.spline.size
+
+
+def test_hues_turn_from_red_to_yellow_to_green():
+    red, green, blue = colour_matrix(50.0, 1.0) @ [0.8, 0.2, 0.2]
+    assert green > 2 * blue
+    assert red > blue
+    red, green, blue = colour_matrix(120.0, 1.0) @ [0.8, 0.2, 0.2]
+    assert green > max(red, blue)
