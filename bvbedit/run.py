@@ -53,7 +53,7 @@ class Outcome:
     seconds: float = 0.0
     error: str | None = None
     notes: tuple[str, ...] = ()
-    """What a user should know: where energy is created, what the last step said."""
+    """What a user should know: what the steps said, and where energy is created."""
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as JSON can hold it."""
@@ -69,8 +69,8 @@ def jobs_of(
     """Return what a recipe asks for: its own source, or each of ``sources`` in its place.
 
     ``folder`` is where the outputs go, by default the recipe's. All that can be known before the first step is made is
-    checked. Raises BvbError for a mistake in the recipe, a missing partner or source, sources of the same name, and
-    outputs that cannot be written.
+    checked; a source that cannot be read fails by itself. Raises BvbError for a mistake in the recipe, a missing
+    partner, outputs that meet one another, a source or a partner, and outputs that cannot be written.
     """
     read = read_recipe(recipe, settings)
     read.check_partners()
@@ -82,9 +82,7 @@ def jobs_of(
     target = Path(recipe).parent if folder is None else folder
     if folder is not None:
         make_folder(folder)
-    jobs = [
-        Job(Path(recipe), tuple(settings), source, target, bool(sources)) for source in chosen if source is not None
-    ]
+    jobs = [Job(Path(recipe), tuple(settings), source, target, bool(sources)) for source in chosen]
     partners = [edit.partner for edit in read.steps if isinstance(edit, Blend)]
     needed = {path.resolve() for path in (*partners, *(s.file for s in chosen if s.file is not None))}
     made: dict[Path, Source] = {}
@@ -99,8 +97,6 @@ def jobs_of(
                     f"{path} would be made of {made[place]} and of {job.source}. Put {{name}} into its name."
                 )
             made[place] = job.source
-            if job.source.file is not None and place == job.source.file.resolve():
-                raise BvbError(f"{path} is the source itself. Choose another output, or --out another folder.")
             if place in needed:
                 raise BvbError(f"{path} is a source or a partner itself. Choose another output, or --out a folder.")
     return jobs

@@ -17,24 +17,8 @@ from bvbedit.edit.recipe import to_toml
 from bvbedit.io.bvb import load_recipe
 from bvbedit.run import jobs_of, run
 from tests.edit import killed
-from tests.edit.samples import smooth
+from tests.edit.samples import LOOK, smooth
 from tests.spline.refusals import refusal
-
-LOOK = """\
-source = "gold.bvb"
-
-[[steps]]
-op = "tint"
-label = "warm"
-rgb = [1.0, 0.8, 0.6]
-
-[[steps]]
-op = "gain"
-factor = 2
-
-[[outputs]]
-file = "{name}-warm.bvb"
-"""
 
 
 def write(folder, text=LOOK, name="look.toml"):
@@ -148,7 +132,7 @@ def test_a_measurement_is_fitted_first_and_its_history_can_be_run(home):
         ('op = "gain"\nfactor = 2', 'op = "store"\nprecision = "float32"\nstep = 1', ("line 8", "float32 has no step")),
         ('source = "gold.bvb"', "", ("names no source",)),
         ('[[outputs]]\nfile = "{name}-warm.bvb"', "", ("names no outputs",)),
-        ("{name}-warm.bvb", "{name}.bvb", ("gold.bvb is the source itself",)),
+        ("{name}-warm.bvb", "{name}.bvb", ("gold.bvb is a source or a partner itself",)),
         ("{name}-warm.bvb", "none/warm.bvb", ("none is no folder",)),
         ("{name}-warm.bvb", "warm.png", ("warm.png",)),
         ("{name}-warm.bvb", "a.bvb'\n[[outputs]]\nfile = 'a.bvb".replace("'", '"'), ("a.bvb would be made twice",)),
@@ -221,7 +205,7 @@ def test_sources_that_would_make_one_file_are_refused(home):
 
 def test_an_output_never_replaces_what_the_recipe_reads(home):
     plain = write(home, LOOK[: LOOK.index("[[outputs]]")])
-    assert "is the source itself" in refusal(lambda: jobs_of(plain, (), [home / "gold.bvb"]))
+    assert "is a source or a partner itself" in refusal(lambda: jobs_of(plain, (), [home / "gold.bvb"]))
     # That of one material is the source of another.
     path = write(home, LOOK.replace("{name}-warm", "{name}2"))
     (home / "gold2.bvb").write_bytes((home / "silver.bvb").read_bytes())

@@ -56,14 +56,16 @@ def edit(
 
 def edit_file(source: Path, target: Path, edits: "Sequence[Edit]", as_json: bool, precision: str | None = None) -> None:
     """Make edits to the model in a file, write it with its history, and tell what changed."""
+    from bvbedit.edit.combining import Blend
     from bvbedit.edit.document import Document
     from bvbedit.errors import BvbError
     from bvbedit.io import check_target
 
     check_target(target, (".bvb",))
     document = Document.open(source)
-    if target.resolve() == source.resolve() and not document.past:
-        raise BvbError(f"{target} is where the history begins, and would be lost. Write to another file.")
+    partners = [each.partner.resolve() for each in edits if isinstance(each, Blend)]
+    if target.resolve() in partners or (target.resolve() == source.resolve() and not document.past):
+        raise BvbError(f"{target} is what the history needs, and would be lost. Write to another file.")
     bytes_before = source.stat().st_size
     steps = []
     with progress(f"Editing {source.name}") as watch:
@@ -95,18 +97,15 @@ def _told(document: "Document", target: Path) -> dict[str, Any]:
 
     before, saved = document.at(0), load(target)
     changes = Changes(before, saved)  # type: ignore[arg-type]
-    told = document.model.report
     was, now = changes.plausibility()
-    result: dict[str, Any] = {
+    return {
         "file": str(target),
         "size_before": list(before.spline.size),
         "size_after": list(document.model.spline.size),
         "degrees": list(document.model.spline.degrees),
         "max_change": changes.max_change,
-        **({"metrics": told["metrics"]} if "metrics" in told else {}),
         "plausibility": {"before": was.text(), "after": now.text()},
     }
-    return result
 
 
 def run(

@@ -13,24 +13,9 @@ from bvbedit.edit.appearance import Gain, Tint
 from bvbedit.edit.document import Document, digest
 from bvbedit.edit.operations import OPERATIONS
 from bvbedit.io.bvb import load_recipe
-from tests.edit.samples import smooth
+from tests.edit.samples import LOOK, smooth
 
 KEYS = {"file", "size_before", "size_after", "bytes_before", "bytes_after", "max_change"}
-LOOK = """\
-source = "gold.bvb"
-
-[[steps]]
-op = "tint"
-label = "warm"
-rgb = [1.0, 0.8, 0.6]
-
-[[steps]]
-op = "gain"
-factor = 2
-
-[[outputs]]
-file = "{name}-warm.bvb"
-"""
 
 
 @pytest.fixture
@@ -96,6 +81,8 @@ def test_without_json_a_short_table_is_printed(run, home):
 def test_a_file_may_be_edited_in_place_and_in_another_precision(run, home):
     path = home / "edited.bvb"
     assert "would be lost" in refused(run("edit", home / "gold.bvb", home / "gold.bvb", "--op", "gain factor=2"))
+    both = "edit", home / "gold.bvb", home / "silver.bvb", "--op", f"blend partner={home / 'silver.bvb'} t=0.5"
+    assert "would be lost" in refused(run(*both))
     run("edit", home / "gold.bvb", path, "--op", "gain factor=2")
     for precision in ("float16", "quantised", "float64"):
         told(run("edit", path, path, "--op", "gain factor=1.5", "--precision", precision, "--json"))
@@ -240,7 +227,7 @@ def test_one_that_fails_does_not_stop_the_others_and_is_told_in_the_end(run, hom
             ("line 8: step 2 (blend): ", "no.bvb"),
         ),
         (("gold.bvb", "lead.bvb"), (), ("lead.bvb does not exist",)),
-        (("{name}-warm", "gold"), (), ("gold.bvb is the source itself",)),
+        (("{name}-warm", "gold"), (), ("gold.bvb is a source or a partner itself",)),
         (("", ""), ("--set", "cold.rgb=1,1,1"), ("'cold'", "warm")),
         (("", ""), ("--set", "2.factor=-1"), ("look.toml, line 8", "factor is -1")),
         (("", ""), ("--set", "2.factor"), ("sets nothing",)),

@@ -26,6 +26,23 @@ CHARTS = (HALF_DIFF, IN_OUT)
 ROOT = Root()
 ENCODINGS = (Linear(), ROOT, Log())
 
+# A recipe of gold.bvb.
+LOOK = """\
+source = "gold.bvb"
+
+[[steps]]
+op = "tint"
+label = "warm"
+rgb = [1.0, 0.8, 0.6]
+
+[[steps]]
+op = "gain"
+factor = 2
+
+[[outputs]]
+file = "{name}-warm.bvb"
+"""
+
 
 @functools.cache
 def smooth(chart: Chart = HALF_DIFF, encoding: Encoding = ROOT, size: tuple[int, int, int] = (8, 6, 5)) -> SplineBrdf:
