@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from bvbedit.brdf.base import Brdf
-from bvbedit.brdf.charts import FITTING_CHARTS, Chart
+from bvbedit.brdf.charts import FITTING_CHARTS, Chart, chart_named
 from bvbedit.brdf.density import Density
 from bvbedit.brdf.encodings import Encoding, check_encoding
 from bvbedit.brdf.geometry import Bools, Floats
@@ -58,6 +58,10 @@ class SplineBrdf(Brdf):
     def __repr__(self) -> str:
         return f"<SplineBrdf {self.chart.name}, {self.encoding.name}, size {self.spline.size}>"
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Charts are told apart by identity, which a copy in another process would lose.
+        return _from_parts, (self.spline, self.chart.name, self.encoding, dict(self.report), self.storage)
+
     @property
     def reciprocal(self) -> bool:  # type: ignore[override]
         """Whether the chart makes f(wi, wo) = f(wo, wi)."""
@@ -87,6 +91,12 @@ class SplineBrdf(Brdf):
     def _evaluate(self, wi: Floats, wo: Floats) -> tuple[Floats, Bools]:
         f = self.encoding.decode(self.spline.evaluate_inside(self.chart.to_parameters(wi, wo)))
         return f, np.ones(len(f), dtype=bool)
+
+
+def _from_parts(
+    spline: TensorSpline, chart: str, encoding: Encoding, report: Mapping[str, Any], storage: Storage
+) -> SplineBrdf:
+    return SplineBrdf(spline, chart_named(chart), encoding, report, storage=storage)
 
 
 def check_fitting_chart(chart: Chart) -> None:

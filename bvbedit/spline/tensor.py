@@ -60,6 +60,10 @@ class TensorSpline:
         net.setflags(write=False)
         self.control: Floats = net
 
+    def __reduce__(self) -> tuple[object, ...]:
+        # Copies that pickle makes of read-only arrays are writable.
+        return TensorSpline, (self.degrees, self.knots, self.control)
+
     def __repr__(self) -> str:
         return f"<TensorSpline degrees {self.degrees}, size {self.size}, {self.channels} channels>"
 

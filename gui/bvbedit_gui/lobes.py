@@ -24,50 +24,56 @@ LINEAR_RANGE = 20.0
 # Half of the great circles leave the mirror direction at equal angles, half reach the horizon in equal steps: seen from
 # just above it, nearly all of the horizon lies within a few degrees of sideways.
 CIRCLES = 400
+# While a slider moves, half as many circles and steps will do: a quarter of the time.
+COARSER = 2
 # Fractions of the way from the mirror direction to the horizon: 1 degree steps or finer nearly everywhere, and 64
 # more in geometric progression towards the mirror direction, the first at 0.002 to 0.02 degrees. Chrome's lobe is half
 # a degree wide.
 FRACTIONS = np.union1d(np.linspace(0, 1, 121), np.geomspace(1e-4, 0.12, 64))
 
 
-def mirror_mesh(theta_i: float) -> tuple[Floats, NDArray[np.int64]]:
+def mirror_mesh(theta_i: float, coarser: int = 1) -> tuple[Floats, NDArray[np.int64]]:
     """Return unit vectors (n, 3) that cover the upper hemisphere, and the triangles (m, 3) between them.
 
     The mesh is polar about the mirror direction of ``theta_i`` (radians, below pi/2), vertex 0, and densest there; its
-    rim is the horizon.
+    rim is the horizon. ``coarser``: every so-manieth circle and step.
     """
+    circles = CIRCLES // coarser
+    fractions = np.append(FRACTIONS[:-1:coarser], FRACTIONS[-1])
     mirror, across = spherical(theta_i, 0.0), np.array([0.0, 1.0, 0.0])
     # Towards the retro-reflective side; mirror, across and up are right-handed, so that triangles face outwards.
     up = np.cross(mirror, across)
-    half = np.arange(0, CIRCLES, 2) * (2 * np.pi / CIRCLES)
-    rim = spherical(np.pi / 2, half + np.pi / CIRCLES)
+    half = np.arange(0, circles, 2) * (2 * np.pi / circles)
+    rim = spherical(np.pi / 2, half + np.pi / circles)
     beta = np.sort(np.concatenate([half, np.arctan2(rim @ up, rim @ across) % (2 * np.pi)]))
     tangent = np.cos(beta)[:, None] * across + np.sin(beta)[:, None] * up
     # Along each great circle from the mirror direction, z = cos a mirror_z + sin a tangent_z falls to zero once.
     horizon = np.arctan2(mirror[2], -tangent[:, 2])
-    angle = FRACTIONS[1:, None] * horizon
+    angle = fractions[1:, None] * horizon
     rings = np.cos(angle)[..., None] * mirror + np.sin(angle)[..., None] * tangent
     rings[-1, :, 2] = 0.0
     directions = np.concatenate([mirror[None], rings.reshape(-1, 3)])
 
-    here = np.arange(CIRCLES)
-    there = (here + 1) % CIRCLES
+    here = np.arange(circles)
+    there = (here + 1) % circles
     fan = np.stack([np.zeros_like(here), 1 + here, 1 + there], axis=-1)
-    inner = 1 + CIRCLES * np.arange(len(rings) - 1)[:, None]
-    a, b, c, d = inner + here, inner + there, inner + CIRCLES + here, inner + CIRCLES + there
+    inner = 1 + circles * np.arange(len(rings) - 1)[:, None]
+    a, b, c, d = inner + here, inner + there, inner + circles + here, inner + circles + there
     bands = np.stack([np.stack([a, c, d], axis=-1), np.stack([a, d, b], axis=-1)], axis=2)
     return directions, np.concatenate([fan, bands.reshape(-1, 3)]).astype(np.int64)
 
 
-def lobe(brdf: Brdf, theta_i: float) -> "PolyData":
+def lobe(brdf: Brdf, theta_i: float, coarser: int = 1) -> "PolyData":
     """Return the lobe of ``brdf`` at ``theta_i`` (radians, below pi/2), uncompressed: radius in 1/sr.
+
+    ``coarser`` as in ``mirror_mesh``.
 
     Point arrays: ``LENGTH`` (n,) the length of f in 1/sr; ``COLOUR`` (n, 3) sRGB bytes of its colour, the largest
     channel at full brightness.
     """
     import pyvista as pv
 
-    wo, triangles = mirror_mesh(theta_i)
+    wo, triangles = mirror_mesh(theta_i, coarser)
     f = brdf.evaluate(spherical(theta_i, np.pi), wo)
     length = np.linalg.norm(f, axis=-1)
     mesh: pv.PolyData = pv.PolyData.from_regular_faces(wo * length[:, None], cast(Any, triangles))
@@ -80,10 +86,33 @@ def lobe(brdf: Brdf, theta_i: float) -> "PolyData":
 def scaled(mesh: "PolyData", scale: Encoding, peak: float) -> "PolyData":
     """Return a ``lobe`` with radius scale(length)/scale(peak), cut where it exceeds ``peak`` (1/sr, positive)."""
     out = mesh.copy()
+    out.clear_point_data()
+    out.point_data[COLOUR] = mesh.point_data[COLOUR]
     length = np.minimum(np.asarray(mesh.point_data[LENGTH]), peak)
     radius = scale.encode(length) / scale.encode(np.array(peak))
     out.points = np.asarray(mesh.point_data["direction"]) * radius[:, None]
-    return out
+    return out.compute_normals(cell_normals=False, split_vertices=False, consistent_normals=False)
+
+
+def wire(mesh: "PolyData") -> "PolyData":
+    """Return every 16th great circle and ring of a ``lobe``'s mesh as lines, with the colours of its points."""
+    import pyvista as pv
+
+    circles = _circles(mesh)
+    rings = (mesh.n_points - 1) // circles
+    index = 1 + np.arange(rings * circles).reshape(rings, circles)
+    round_lines = [np.append(ring, ring[0]) for ring in index[7::8]]
+    out_lines = [np.append(0, index[:, k]) for k in range(0, circles, max(1, circles // 24))]
+    lines = np.concatenate([np.append(len(line), line) for line in (*round_lines, *out_lines)])
+    net = pv.PolyData(mesh.points, lines=lines)
+    net.point_data[COLOUR] = mesh.point_data[COLOUR]
+    return net
+
+
+def _circles(mesh: "PolyData") -> int:
+    """Return how many great circles a ``lobe``'s mesh has: the first ones are the fan about its vertex 0."""
+    faces = np.asarray(mesh.regular_faces)
+    return int((faces[:, 0] == 0).sum())
 
 
 def fitting_scale(mesh: "PolyData") -> Encoding:

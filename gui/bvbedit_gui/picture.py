@@ -11,7 +11,9 @@ from bvbedit.errors import BvbError
 from bvbedit.io import check_target
 from bvbedit.io.png import write_png
 from bvbedit_gui import lobes, panels
+from bvbedit_gui.drawing import number, write
 from bvbedit_gui.opengl import require_opengl
+from bvbedit_gui.themes import LIGHT
 
 if TYPE_CHECKING:
     from pyvista import Plotter
@@ -69,10 +71,10 @@ def screenshot(
         size = " x ".join(str(n) for n in model.spline.size)
         words = f"{title or 'B-spline volume BRDF'}: {model.chart.name}, {model.encoding.name}, {size} control points"
         plotter.subplot(0, 0)
-        plotter.renderer.set_background(panels.PAPER)
-        panels.write(plotter, words, (0.01, 0.88), panels.INK, round(1.4 * text_size), bold=True)
-        panels.write(plotter, VOLUME_CAPTION, (0.01, 0.36), panels.INK, text_size)
-        panels.write(plotter, LOBES_CAPTION, (split, 0.36), panels.INK, text_size)
+        plotter.renderer.set_background(LIGHT.paper)
+        write(plotter, words, (0.01, 0.88), LIGHT.ink, round(1.4 * text_size), bold=True)
+        write(plotter, VOLUME_CAPTION, (0.01, 0.36), LIGHT.ink, text_size)
+        write(plotter, LOBES_CAPTION, (split, 0.36), LIGHT.ink, text_size)
         plotter.subplot(1, 0)
         panels.show_volume(plotter, model, text_size=text_size)
         for row, (written, drawn) in enumerate(INCIDENCES, start=1):
@@ -98,9 +100,9 @@ def _show_lobes(
     peak = min(max(peaks.values()), MOST_OVERSHOOT * peaks[reference] or np.inf) or 1.0
     for column, (name, brdf) in enumerate(brdfs.items(), start=1):
         title = f"{name}, θ_i = {written}°" + (f" (drawn at {drawn:g}°)" if written != drawn else "")
-        title += f"\npeak {panels.number(peaks[name])}/sr"
+        title += f"\npeak {number(peaks[name])}/sr"
         if peaks[name] > peak:
-            title += f", cut at {panels.number(peak)}"
+            title += f", cut at {number(peak)}"
         if theta_i > brdf.reliable_elevation + 1e-9:
             title += f", unreliable beyond {np.degrees(brdf.reliable_elevation):.3g}°"
         plotter.subplot(row, column)

@@ -1,30 +1,38 @@
-"""The volume over its parameter box: surfaces of equal reflectance, the control net, and what the axes mean.
+"""The volume over its parameter box: surfaces of equal value, slices, the control net, knots, and what the axes mean.
 
-Pure functions from a model to PyVista meshes in chart parameters [0, 1]^3; no window is opened here.
+Pure functions from a BRDF to arrays and PyVista meshes in chart parameters [0, 1]^3; no window is opened here.
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import cached_property
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from bvbedit.brdf.charts import Chart
+from bvbedit.brdf.base import Brdf
+from bvbedit.brdf.charts import Chart, grid_points
 from bvbedit.brdf.geometry import Floats
 from bvbedit.brdf.spline_brdf import SplineBrdf
 
 if TYPE_CHECKING:
-    from pyvista import ImageData, PolyData
+    from pyvista import ImageData, PolyData, StructuredGrid
 
-# The luminance of linear sRGB (ITU-R BT.709), by which surfaces and control points are placed and coloured.
+# What of the reflectance is shown: a mean by sight, a channel, or by how much it differs from a reference.
+What = Literal["luminance", "red", "green", "blue", "difference"]
+# The luminance of linear sRGB (ITU-R BT.709).
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-# The name of the point array that carries it.
-REFLECTANCE = "reflectance"
+# The name of the point array by which meshes are coloured: levels, see ``Field``.
+LEVEL = "level"
 # Below this (1/sr) reflectance counts as black: a logarithm needs a floor, and no measurement resolves less.
 FLOOR = 1e-6
 # Surfaces inside one another that an eye can still tell apart.
 MOST_SURFACES = 6
 # Mantissas of iso-values, the roundest first: decades where the range holds three of them, finer steps otherwise.
 MANTISSAS = ((1.0,), (1.0, 3.0), (1.0, 2.0, 5.0), (1.0, 1.5, 2.0, 3.0, 5.0, 7.0))
+# The share of the box that may lie below the lowest iso-value: the last dark cells are mostly noise.
+DARKEST = 2.0
+# Nodes along each axis of what has no control points, and of slices.
+NODES, SLICE_NODES = 81, 161
 
 
 def luminance(rgb: Floats) -> Floats:
@@ -32,19 +40,71 @@ def luminance(rgb: Floats) -> Floats:
     return np.asarray(rgb @ LUMINANCE)
 
 
-def sampled(model: SplineBrdf) -> "ImageData":
-    """Return the model's luminance in 1/sr, no less than ``FLOOR``, on a regular grid of its parameter box.
+def scalar(rgb: Floats, what: What) -> Floats:
+    """Return what is shown (...) of reflectance, or of a difference of reflectances, (..., 3)."""
+    return luminance(rgb) if what in ("luminance", "difference") else rgb[..., ("red", "green", "blue").index(what)]
 
-    About two nodes for each control point, within limits that keep the picture smooth and the contouring fast.
+
+def box_nodes(brdf: Brdf) -> tuple[Floats, Floats, Floats]:
+    """Return the nodes along each axis at which the box is sampled: about two for each control point, within limits."""
+    size = brdf.spline.size if isinstance(brdf, SplineBrdf) else (0, 0, 0)
+    counts = [min(max(2 * n + 1, NODES), 2 * NODES - 1) for n in size]
+    return np.linspace(0, 1, counts[0]), np.linspace(0, 1, counts[1]), np.linspace(0, 1, counts[2])
+
+
+def sampled(brdf: Brdf, chart: Chart, axes: tuple[Floats, Floats, Floats]) -> Floats:
+    """Return the reflectance (n_0, n_1, n_2, 3) in 1/sr on the grid of a chart's parameters with these ``axes``."""
+    if isinstance(brdf, SplineBrdf) and brdf.chart is chart:
+        return brdf.encoding.decode(brdf.spline.evaluate_grid(axes))
+    f = brdf.evaluate(*chart.to_directions(grid_points(axes)))
+    return f.reshape(*(len(axis) for axis in axes), 3)
+
+
+@dataclass(frozen=True)
+class Field:
+    """Values (n_0, n_1, n_2) in 1/sr on a regular grid of the box, and the levels by which they are drawn.
+
+    Levels are logarithms to base 10 of values. Of differences, which have a sign, they are log10(1 + |value| / FLOOR)
+    with that sign.
     """
-    import pyvista as pv
 
-    shape = [min(max(2 * n + 1, 81), 161) for n in model.spline.size]
-    rgb = model.encoding.decode(model.spline.evaluate_grid([np.linspace(0, 1, m) for m in shape]))
-    grid = pv.ImageData(dimensions=shape, spacing=[1 / (m - 1) for m in shape])
-    # VTK's first axis runs fastest.
-    grid.point_data[REFLECTANCE] = np.maximum(luminance(rgb), FLOOR).ravel(order="F")
-    return grid
+    values: Floats
+    signed: bool = False
+
+    def level(self, value: Floats | float) -> Floats:
+        """Return the levels (...) of values (...)."""
+        value = np.asarray(value, dtype=np.float64)
+        if self.signed:
+            return np.asarray(np.sign(value) * np.log10(1 + np.abs(value) / FLOOR))
+        return np.asarray(np.log10(np.maximum(value, FLOOR)))
+
+    @cached_property
+    def grid(self) -> "ImageData":
+        """The levels on the box's regular grid, as VTK has it."""
+        import pyvista as pv
+
+        shape = self.values.shape
+        out = pv.ImageData(dimensions=shape, spacing=[1 / (m - 1) for m in shape])
+        # VTK's first axis runs fastest.
+        out.point_data[LEVEL] = self.level(self.values).ravel(order="F")
+        return out
+
+    @cached_property
+    def ends(self) -> tuple[float, float]:
+        """The smallest and the largest value that surfaces are worth being drawn at; of differences, of their sizes."""
+        sizes = np.abs(self.values)
+        low, high = float(np.percentile(sizes, DARKEST)), float(sizes.max())
+        return max(low, FLOOR), max(high, FLOOR)
+
+
+def field(brdf: Brdf, chart: Chart, what: What = "luminance", reference: Brdf | None = None) -> Field:
+    """Return what is shown of ``brdf`` over the parameter box of a chart; a difference to ``reference`` has a sign."""
+    axes = box_nodes(brdf)
+    rgb = sampled(brdf, chart, axes)
+    if what == "difference":
+        assert reference is not None
+        return Field(scalar(rgb - sampled(reference, chart, axes), what), signed=True)
+    return Field(scalar(rgb, what))
 
 
 def iso_values(low: float, high: float) -> list[float]:
@@ -68,30 +128,77 @@ def iso_values(low: float, high: float) -> list[float]:
     return [float(v) for v in np.geomspace(low, high, 6)[1:-1]]
 
 
-def iso_surfaces(grid: "ImageData", values: list[float]) -> "PolyData":
-    """Return the surfaces on which ``sampled`` luminance has the given ``values`` (1/sr), carrying them.
+def iso_surfaces(shown: Field, values: list[float]) -> "PolyData":
+    """Return the surfaces on which the field has the given ``values`` (1/sr), carrying their levels, with normals.
 
-    Empty where no value is met. Between nodes the logarithm of reflectance is taken to be linear.
+    Of a difference, those on which it has plus or minus a value. Empty where no value is met. Between nodes the level
+    is taken to be linear.
     """
     import pyvista as pv
 
-    logs = grid.copy()
-    logs.point_data[REFLECTANCE] = np.log10(grid.point_data[REFLECTANCE])
-    if not values:
+    levels = [float(shown.level(v)) for v in values]
+    if shown.signed:
+        levels += [-level for level in levels]
+    if not levels:
         return pv.PolyData()
-    surfaces: pv.PolyData = logs.contour(list(np.log10(values)), scalars=REFLECTANCE, method="flying_edges")
-    surfaces.point_data[REFLECTANCE] = 10.0 ** surfaces.point_data[REFLECTANCE]
+    surfaces: pv.PolyData = shown.grid.contour(levels, scalars=LEVEL, method="flying_edges", compute_normals=True)
     return surfaces
 
 
-def control_net(model: SplineBrdf) -> "PolyData":
-    """Return the control points at their Greville abscissae, carrying the luminance (1/sr) of their decoded values."""
+def slice_mesh(
+    brdf: Brdf, chart: Chart, axis: int, at: float, what: What = "luminance", reference: Brdf | None = None
+) -> "StructuredGrid":
+    """Return the plane where the parameter ``axis`` is ``at``, carrying levels."""
     import pyvista as pv
 
-    points = np.stack(np.meshgrid(*model.spline.greville, indexing="ij"), axis=-1).reshape(-1, 3)
-    net = pv.PolyData(points)
-    net.point_data[REFLECTANCE] = np.maximum(luminance(model.encoding.decode(model.spline.control)), FLOOR).ravel()
+    line = np.linspace(0, 1, SLICE_NODES)
+    axes = (line, line, line)
+    axes = (*axes[:axis], np.array([at]), *axes[axis + 1 :])
+    rgb = sampled(brdf, chart, axes)
+    if what == "difference":
+        assert reference is not None
+        rgb = rgb - sampled(reference, chart, axes)
+    x, y, z = np.meshgrid(*axes, indexing="ij")
+    mesh = pv.StructuredGrid(x, y, z)
+    shown = Field(scalar(rgb, what), signed=what == "difference")
+    mesh.point_data[LEVEL] = shown.level(shown.values).ravel(order="F")
+    return mesh
+
+
+def net_points(model: SplineBrdf) -> Floats:
+    """Return the Greville abscissae (n, 3) of the control points, the last axis running fastest."""
+    return np.clip(grid_points(tuple(model.spline.greville)), 0.0, 1.0)
+
+
+def net_values(model: SplineBrdf, what: What = "luminance") -> Floats:
+    """Return what is shown (n,), in 1/sr, of the decoded control points."""
+    rgb = model.encoding.decode(model.spline.control).reshape(-1, 3)
+    return scalar(rgb, "luminance" if what == "difference" else what)
+
+
+def control_net(model: SplineBrdf) -> "PolyData":
+    """Return the control points at their Greville abscissae, carrying the levels of their decoded luminance."""
+    import pyvista as pv
+
+    net = pv.PolyData(net_points(model))
+    values = net_values(model)
+    net.point_data[LEVEL] = Field(values).level(values)
     return net
+
+
+def knot_planes(model: SplineBrdf, axis: int) -> "PolyData":
+    """Return the outlines of the planes on which the interior knots of an axis lie; empty where there are none."""
+    import pyvista as pv
+
+    t = model.spline.knots[axis]
+    inside = np.unique(t[(t > 0) & (t < 1)])
+    if not len(inside):
+        return pv.PolyData()
+    corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0]])
+    loops = np.insert(np.broadcast_to(corners, (len(inside), 5, 2)), axis, inside[:, None], axis=2)
+    first = 5 * np.arange(len(inside))[:, None]
+    lines = np.concatenate([np.full_like(first, 5), first + np.arange(5)], axis=1)
+    return pv.PolyData(loops.reshape(-1, 3), lines=lines.ravel())
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,116 @@
+"""Areas of the page that show pictures made here: scenes that are turned and clicked, and ready-made pictures.
+
+Each is what trame-rca calls a remote controlled area: it is told its size and what the mouse does, and asked for its
+pixels, first at once and then, when nothing has moved for a moment, once more for a picture to keep.
+"""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from pyvista import Plotter
+
+Pixels = NDArray[np.uint8]
+# A press and a release within so many pixels are a click; beyond that something was dragged.
+CLICK = 4
+
+
+class SceneArea:
+    """A PyVista plotter: dragging turns it, a click is reported. Smoothed only when it has come to rest."""
+
+    def __init__(self, plotter: "Plotter", clicked: Callable[[float, float, bool], object]) -> None:
+        from trame_rca.rca import VtkRemoteControlledArea
+
+        self._plotter = plotter
+        # Many samples a pixel cost three times the picture itself, and are there by default.
+        plotter.render_window.SetMultiSamples(0)
+        plotter.disable_anti_aliasing()
+        self._window = VtkRemoteControlledArea(plotter.render_window)
+        self._clicked = clicked
+        self._pressed: tuple[float, float] | None = None
+        self._moved = True
+        self._smooth = False
+        self.drawn = 0
+
+    def moved(self) -> None:
+        """Say that the next picture is one of many."""
+        self._moved = True
+
+    @property
+    def img_cols_rows(self) -> tuple[Pixels, int, int]:
+        """Pixels (rows, columns, 3), columns and rows."""
+        if self._smooth == self._moved:
+            self._smooth = not self._moved
+            if self._smooth:
+                self._plotter.enable_anti_aliasing("ssaa")
+            else:
+                self._plotter.disable_anti_aliasing()
+        self._moved = False
+        self.drawn += 1
+        pixels: tuple[Pixels, int, int] = self._window.img_cols_rows
+        return pixels
+
+    def process_resize_event(self, width: int, height: int) -> None:
+        """Take another size, in pixels."""
+        self.moved()
+        self._window.process_resize_event(width, height)
+
+    def process_interaction_event(self, event: dict[str, Any]) -> None:
+        """Turn the scene, or report a click with its place and whether the shift key was down."""
+        self.moved()
+        kind = event.get("type")
+        if kind == "LeftButtonPress":
+            self._pressed = event["x"], event["y"]
+        self._window.process_interaction_event(event)
+        if kind == "LeftButtonRelease" and self._pressed is not None:
+            x, y = self._pressed
+            self._pressed = None
+            if np.hypot(event["x"] - x, event["y"] - y) <= CLICK:
+                self._clicked(x, y, bool(event.get("shiftKey")))
+
+
+class PictureArea:
+    """A picture, as large as its area allows, in the middle of it."""
+
+    def __init__(self, resized: Callable[[int, int], object]) -> None:
+        self.size = (320, 240)
+        self.background = (0, 0, 0)
+        self._resized = resized
+        self._picture: Pixels | None = None
+        self.drawn = 0
+
+    def show(self, picture: Pixels | None) -> None:
+        """Show another picture (h, w, 3), or nothing."""
+        self._picture = picture
+
+    @property
+    def img_cols_rows(self) -> tuple[Pixels, int, int]:
+        """Pixels (rows, columns, 3), columns and rows."""
+        from PIL import Image
+
+        width, height = self.size
+        out = np.empty((height, width, 3), dtype=np.uint8)
+        out[:] = self.background
+        self.drawn += 1
+        picture = self._picture
+        if picture is not None:
+            h, w = picture.shape[:2]
+            scale = min(width / w, height / h)
+            size = max(1, round(w * scale)), max(1, round(h * scale))
+            if size != (w, h):
+                picture = np.asarray(Image.fromarray(picture).resize(size, Image.Resampling.BICUBIC))
+            left, top = (width - size[0]) // 2, (height - size[1]) // 2
+            out[top : top + size[1], left : left + size[0]] = picture
+        return out, width, height
+
+    def process_resize_event(self, width: int, height: int) -> None:
+        """Take another size, in pixels."""
+        if (width, height) != self.size:
+            self.size = (width, height)
+            self._resized(width, height)
+
+    def process_interaction_event(self, event: dict[str, Any]) -> None:
+        """Nothing can be done with a picture."""

@@ -1,0 +1,124 @@
+"""The preview's panel: which scene, how bright, and beside what the picture stands."""
+
+import asyncio
+from typing import TYPE_CHECKING, Any
+
+from bvbedit_gui import places as files
+from bvbedit_gui.areas import PictureArea
+from bvbedit_gui.preview import GAP, Layout, Preview, Seen, Wish, composed
+from bvbedit_gui.themes import Theme
+
+if TYPE_CHECKING:
+    from bvbedit_gui.viewer import Viewer
+
+SCENES = ("sphere", "studio", "furnace")
+LAYOUTS: tuple[Layout, ...] = ("alone", "beside", "difference")
+# Sides of the pictures that are rendered; they are scaled to the panel.
+SIDES = (128, 192, 256, 320, 384, 512)
+STARTS: dict[str, Any] = {"scene": "sphere", "exposure": 0.0, "layout": "beside", "preview_note": ""}
+
+
+class PreviewView:
+    """Shows the picture of what the viewer shows, and that of what it is compared with."""
+
+    def __init__(self, viewer: "Viewer", theme: Theme, *, passes: bool) -> None:
+        self._viewer = viewer
+        self.state = viewer.state
+        self.state.update(STARTS)
+        self.area = PictureArea(lambda *_: self.refresh())
+        self.area.background = _rgb(theme.paper)
+        self.send: Any = lambda: None
+        self.seen: Seen | None = None
+        self._wish: Wish | None = None
+        self._shown: Wish | None = None
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._preview = Preview(self._published, self._failed, passes=passes)
+        self.state.change("scene")(lambda **_: self.refresh())
+        self.state.change("layout")(lambda **_: self.refresh())
+        self.state.change("exposure")(lambda **_: self.compose())
+
+    @property
+    def first_pass_due(self) -> bool:
+        """Whether the newest wish has no picture yet."""
+        return self._wish is not self._shown
+
+    def refresh(self) -> None:
+        """Make the picture anew."""
+        shown = self._viewer.shown
+        if shown is None:
+            return
+        other = None if self.state.layout == "alone" else self._viewer.other
+        try:
+            self._loop = asyncio.get_running_loop()
+        except RuntimeError:
+            return  # nobody could be told of the picture
+        scene = self.state.scene
+        if scene not in SCENES:
+            with self._viewer.telling("preview"):
+                scene = self._viewer.session.places.path(str(scene), files.SCENES)
+            if self.state.error_preview:
+                return
+        wish = Wish(shown, other, scene, self._side(1 if other is None else 2 if self.state.layout == "beside" else 3))
+        self._wish = wish
+        self._preview.ask(wish)
+
+    def _side(self, beside: int) -> int:
+        width, height = self.area.size
+        room = min(height, (width - (beside - 1) * GAP) / beside)
+        return max((side for side in SIDES if side <= room * 1.1), default=SIDES[0])
+
+    def _published(self, wish: Wish, seen: Seen) -> None:
+        loop = self._loop
+        if loop is not None and not loop.is_closed():
+            loop.call_soon_threadsafe(self._show, wish, seen)
+
+    def _failed(self, wish: Wish, told: str) -> None:
+        loop = self._loop
+        if loop is not None and not loop.is_closed():
+            loop.call_soon_threadsafe(self._tell, wish, told)
+
+    def _tell(self, wish: Wish, told: str) -> None:
+        self._shown = wish
+        with self.state:
+            self.state.error_preview = told
+
+    def _show(self, wish: Wish, seen: Seen) -> None:
+        if wish is not self._wish:
+            return
+        self.seen, self._shown = seen, wish
+        with self.state:
+            self.state.error_preview = ""
+            self.compose()
+
+    def compose(self) -> None:
+        """Lay the pictures out, at the exposure that is asked for."""
+        seen = self.seen
+        if seen is None:
+            return
+        try:
+            exposure = min(max(float(self.state.exposure), -10.0), 10.0)
+        except (TypeError, ValueError):
+            exposure = 0.0
+        layout = self.state.layout if self.state.layout in LAYOUTS else "alone"
+        picture, found, gain = composed(seen, layout, exposure)
+        told = f"{seen.samples} samples a pixel"
+        if found is not None:
+            told += f", MAE {255 * found.mae:.2f}, PAE {255 * found.pae:.0f} of 255"
+        if gain > 1:
+            told += f"; differences times {gain:.0f}"
+        self.state.preview_note = told
+        self.area.show(picture)
+        self.send()
+
+    def recolour(self, theme: Theme) -> None:
+        """Take another colour for the paper."""
+        self.area.background = _rgb(theme.paper)
+        self.send()
+
+    def close(self) -> None:
+        """End the thread."""
+        self._preview.close()
+
+
+def _rgb(colour: str) -> tuple[int, int, int]:
+    return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)

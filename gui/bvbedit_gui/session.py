@@ -1,0 +1,206 @@
+"""What is open in the viewer: materials with their documents, as values. Knows nothing of pages or pictures."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from bvbedit.brdf.base import Brdf
+from bvbedit.brdf.materials import MATERIALS, material_named
+from bvbedit.brdf.spline_brdf import SplineBrdf
+from bvbedit.edit.autosave import autosave, autosave_path, discard_autosave, recovered
+from bvbedit.edit.document import Document
+from bvbedit.edit.operation import Edit
+from bvbedit.edit.recipe import Source, to_toml
+from bvbedit.errors import BvbError
+from bvbedit.io import load
+from bvbedit_gui.places import MODELS, Places
+
+UNTITLED = "untitled"
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A material: a model with its history, what it is compared with, or a measurement that has no model yet."""
+
+    name: str
+    document: Document | None = None
+    path: Path | None = None
+    """The .bvb file that it was opened from or saved to."""
+    saved: Document | None = None
+    """What that file holds."""
+    reference: Brdf | None = None
+    """The material that the model is an approximation of, or another one to compare with."""
+    reference_name: str = ""
+    measurement: Source | None = None
+    """How a recipe names the reference, where that can be fitted."""
+
+    @property
+    def shown(self) -> Brdf:
+        """The model, or the measurement where there is none."""
+        if self.document is not None:
+            return self.document.model
+        assert self.reference is not None  # one of the two is always there
+        return self.reference
+
+    @property
+    def model(self) -> SplineBrdf:
+        """The model. Raises BvbError where there is none yet."""
+        return self.known_document.model
+
+    @property
+    def known_document(self) -> Document:
+        """The document. Raises BvbError where there is none yet."""
+        if self.document is None:
+            raise BvbError(f"{self.name} is a measurement. Fit it first.")
+        return self.document
+
+    @property
+    def unsaved(self) -> bool:
+        """Whether its file, if there is one, holds something else."""
+        if self.document is None:
+            return False
+        return self.saved is None or self.document.lines != self.saved.lines or self.document.names != self.saved.names
+
+    def with_document(self, document: Document) -> "Opened":
+        """Return the material after an edit, an undo or a redo."""
+        return replace(self, document=document)
+
+
+class Session:
+    """The open materials, and which of them is worked on. Each is a value; the session says which ones stand."""
+
+    def __init__(self, places: Places) -> None:
+        self.places = places
+        self._opened: dict[int, Opened] = {}
+        self._next = 1
+        self.current: int | None = None
+
+    def __iter__(self) -> Iterator[tuple[int, Opened]]:
+        return iter(list(self._opened.items()))
+
+    def __contains__(self, key: object) -> bool:
+        return key in self._opened
+
+    def __getitem__(self, key: int) -> Opened:
+        return self._opened[key]
+
+    @property
+    def here(self) -> Opened:
+        """The material that is worked on. Raises BvbError where nothing is open."""
+        if self.current is None:
+            raise BvbError("Nothing is open. Open a material or a sample first.")
+        return self._opened[self.current]
+
+    @property
+    def document(self) -> Document:
+        """The document that is worked on. Raises BvbError where there is none."""
+        return self.here.known_document
+
+    def add(self, opened: Opened) -> int:
+        """Open a material, and work on it; return its key. Its name is made one that no other has."""
+        names = {o.name for o in self._opened.values()}
+        name, n = opened.name, 2
+        while name in names:
+            name, n = f"{opened.name} ({n})", n + 1
+        key, self._next = self._next, self._next + 1
+        self._opened[key] = replace(opened, name=name)
+        self.current = key
+        return key
+
+    def put(self, opened: Opened, key: int | None = None) -> None:
+        """Let a value stand for the material that is worked on, or another one."""
+        at = self.current if key is None else key
+        assert at is not None
+        self._opened[at] = opened
+
+    def close(self, key: int) -> None:
+        """Close a material; what was kept of it for the case of a crash is not wanted any more."""
+        closed = self._opened.pop(key)
+        if closed.path is not None:
+            discard_autosave(closed.path)
+        if self.current == key:
+            self.current = next(reversed(self._opened), None)
+
+    def find(self, path: Path) -> int | None:
+        """Return the key of the material that was opened from ``path`` or saved to it."""
+        return next((key for key, o in self._opened.items() if o.path == path), None)
+
+    def update(self, document: Document) -> None:
+        """Let a document stand for the one that is worked on."""
+        self.put(self.here.with_document(document))
+
+    def do(self, edit: Edit, model: SplineBrdf | None = None) -> None:
+        """Edit the document that is worked on; ``model``: what the edit makes of it, where that is known."""
+        document = self.document
+        self.update(document.do(edit) if model is None else document.done(edit, model))
+
+    def save(self, path: Path, *, precision: str | None = None, pdf: bool = False) -> None:
+        """Save the document that is worked on, and go on with the file. Raises BvbError where that cannot be done."""
+        here = self.here
+        other = self.find(path)
+        if other is not None and other != self.current:
+            raise BvbError(f"{path.name} is open as another document. Close that first, or choose another name.")
+        if here.measurement is not None and here.measurement.file == path:
+            raise BvbError(f"{path.name} is the measurement itself. Choose another name.")
+        document = here.known_document
+        document.save(path, precision=precision, pdf=pdf)
+        if here.path is not None and here.path != path:
+            discard_autosave(here.path)
+        discard_autosave(path)
+        self.put(replace(here, name=path.name, path=path, saved=document))
+
+    def recipe(self) -> str:
+        """Return how the model came about, as a recipe. Raises BvbError where there is no model."""
+        here = self.here
+        output = here.path.name if here.path is not None else f"{Path(here.name).stem}-edited.bvb"
+        return to_toml(here.known_document.recipe(), [output])
+
+    def keep(self) -> None:
+        """Keep what is unsaved beside its file, for the case of a crash."""
+        for _, opened in self:
+            if opened.unsaved and opened.document is not None:
+                autosave(opened.document, self._keeping_place(opened))
+
+    def _keeping_place(self, opened: Opened) -> Path:
+        return opened.path or self.places.folder / f"{Path(opened.name).stem}.bvb"
+
+
+def opened_file(path: Path, name: str) -> Opened:
+    """Return the material in a file: a model with its history, or a measurement. Raises BvbError as ``load`` does."""
+    if path.suffix.lower() in MODELS:
+        document = Document.open(path)
+        return Opened(name, document, path, document)
+    brdf = load(path)
+    if isinstance(brdf, SplineBrdf):
+        document = Document.of(brdf, file=str(path))
+        return Opened(name, document, None, document)
+    return Opened(name, reference=brdf, reference_name=name, measurement=Source(file=path))
+
+
+def opened_sample(name: str) -> Opened:
+    """Return a sample material, still to be fitted: it is its own measurement, without noise."""
+    return Opened(name, reference=material_named(name).brdf, reference_name=name, measurement=Source(sample=name))
+
+
+def opened_recovered(path: Path, name: str) -> Opened | None:
+    """Return what was kept of a file when the program ended, or None. Raises BvbError where it is damaged."""
+    document = recovered(path)
+    if document is None:
+        return None
+    saved = None
+    if path.exists():
+        opened = Document.open(path)
+        saved = opened if opened.source == document.source else None
+    return Opened(name, document, path if path.exists() else None, saved)
+
+
+def kept_files(places: Places) -> list[Path]:
+    """Return the files in the folder, or named, of which something unsaved was kept."""
+    found = {path.with_name(path.name[1 : -len(".autosave")]) for path in places.folder.glob(".*.bvb.autosave")}
+    found |= {path for path in places.named if autosave_path(path).exists()}
+    return sorted(found)
+
+
+def samples() -> dict[str, str]:
+    """Return the names of the sample materials, and what each looks like."""
+    return {name: material.description for name, material in MATERIALS.items()}

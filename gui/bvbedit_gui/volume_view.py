@@ -1,0 +1,241 @@
+"""The volume's panel: what of the field is shown, and the scene that shows it."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bvbedit.brdf.base import Brdf
+from bvbedit.brdf.charts import Chart
+from bvbedit.brdf.geometry import Floats
+from bvbedit.brdf.spline_brdf import SplineBrdf
+from bvbedit_gui import volume
+from bvbedit_gui.areas import SceneArea
+from bvbedit_gui.drawing import number
+from bvbedit_gui.themes import Theme
+from bvbedit_gui.volume_scene import COLOUR_MAP, DIFFERENCE_MAP, VIEWS, VolumeScene
+
+if TYPE_CHECKING:
+    from pyvista import PolyData, StructuredGrid
+
+    from bvbedit_gui.viewer import Viewer
+
+TEXT_SIZE = 13
+# Colours run a little beyond the values, so that the outermost surfaces do not take the map's extreme colours.
+MARGIN = 0.3
+STARTS: dict[str, Any] = {
+    "what": "luminance",
+    "what_items": [],
+    "iso": -1.0,
+    "iso_low": -3.0,
+    "iso_high": 1.0,
+    "iso_text": "",
+    "iso_count": 3,
+    "iso_gap": 1.0,
+    "opacity": 0.55,
+    "show_net": False,
+    "show_knots": False,
+    **{f"slice_{n}_on": False for n in range(3)},
+    **{f"slice_{n}": 0.5 for n in range(3)},
+    "mode": "turn",
+    "bar_css": "",
+    "bar_ticks": [],
+    "bar_title": "",
+}
+TITLES = {
+    "luminance": "luminance",
+    "red": "red channel",
+    "green": "green channel",
+    "blue": "blue channel",
+    "difference": "difference",
+}
+
+
+@dataclass(frozen=True)
+class _Drawn:
+    """What a thread has made for the scene."""
+
+    chart: Chart
+    field: volume.Field
+    net: tuple[Floats, Floats] | None
+    knots: "list[PolyData] | None"
+    slices: "list[StructuredGrid | None]"
+
+
+class VolumeView:
+    """Shows iso-surfaces, slices, net and knots of what the viewer shows."""
+
+    def __init__(self, viewer: "Viewer", theme: Theme) -> None:
+        import pyvista as pv
+
+        self._viewer = viewer
+        self.state = viewer.state
+        self.state.update(STARTS)
+        self.queue = viewer.latest("volume")
+        self.plotter = pv.Plotter(off_screen=True, window_size=[640, 480])
+        self.scene = VolumeScene(self.plotter, theme, TEXT_SIZE)
+        self.scene.look_from("oblique")
+        self.area = SceneArea(self.plotter, viewer_clicked(viewer))
+        # The page's view, once there is a page: asked to send a picture.
+        self.send: Any = lambda: None
+        self.field: volume.Field | None = None
+        self._unseen = True
+        on = self.state.change
+        on("what")(lambda **_: self.refresh())
+        on("iso", "iso_count", "iso_gap", "opacity")(lambda **_: self.show_surfaces())
+        on("show_net", "show_knots", *(f"slice_{n}{s}" for n in range(3) for s in ("", "_on")))(
+            lambda **_: self.refresh()
+        )
+
+    def forget_view(self) -> None:
+        """Choose iso-values anew when the next material is shown: it is another one."""
+        self._unseen = True
+
+    def synchronise(self) -> None:
+        """Offer what can be shown; a difference needs something to differ from."""
+        items = [{"value": value, "title": title} for value, title in TITLES.items()]
+        if self._viewer.other is None:
+            items.pop()
+            if self.state.what == "difference":
+                self.state.what = "luminance"
+        self.state.what_items = items
+
+    def refresh(self) -> None:
+        """Draw the volume anew."""
+        shown, other, chart = self._viewer.shown, self._viewer.other, self._viewer.chart
+        if shown is None:
+            return
+        state = self.state
+        what = state.what if state.what in TITLES and (other is not None or state.what != "difference") else "luminance"
+        slices = [float(state[f"slice_{n}"]) if state[f"slice_{n}_on"] else None for n in range(3)]
+        wanted = bool(state.show_net), bool(state.show_knots)
+        self.queue.ask(lambda: _draw(shown, chart, what, other, slices, *wanted), self._show)
+
+    def _show(self, drawn: _Drawn) -> None:
+        self.field = drawn.field
+        low, high = drawn.field.ends
+        with self.state:
+            self._bounds(low, high)
+            self._colours(drawn.field, low, high)
+            self.scene.show_chart(drawn.chart)
+            self.scene.show_net(*(drawn.net or (None,)))
+            self.scene.show_knots(drawn.knots)
+            for axis, mesh in enumerate(drawn.slices):
+                self.scene.show_slice(axis, mesh)
+            self._viewer.picking.show_region()
+            self.show_surfaces()
+
+    def _bounds(self, low: float, high: float) -> None:
+        """Let the slider span what the field spans, and stand at a value that shows something."""
+        state = self.state
+        first, last = float(np.floor(20 * np.log10(low)) / 20), float(np.ceil(20 * np.log10(high)) / 20)
+        last = max(last, first + 0.1)
+        if (state.iso_low, state.iso_high) != (first, last):
+            state.update({"iso_low": first, "iso_high": last})
+        values = volume.iso_values(low, high)
+        if self._unseen:
+            self._unseen = False
+            gap = float(np.log10(values[1] / values[0])) if len(values) > 1 else 0.5
+            top = float(np.log10(values[-1])) if values else last
+            state.update({"iso": round(top, 3), "iso_gap": min(round(gap, 2), 2.0), "iso_count": min(len(values), 3)})
+        elif not first <= _real(state.iso, first) <= last:
+            state.iso = float(np.clip(_real(state.iso, first), first, last))
+
+    def _colours(self, field: volume.Field, low: float, high: float) -> None:
+        from matplotlib import colormaps
+
+        first, last = float(field.level(low)), float(field.level(high))
+        if field.signed:
+            first = -last
+        else:
+            first, last = first - MARGIN, last + MARGIN
+        self.scene.colour_by(first, last, signed=field.signed)
+        stops = colormaps[DIFFERENCE_MAP if field.signed else COLOUR_MAP](np.linspace(0, 1, 17), bytes=True)
+        css = ", ".join(f"rgb({r},{g},{b})" for r, g, b, _ in stops)
+        values = volume.iso_values(low, high) or [high]
+        values = values[:: -(-len(values) // 3)] if field.signed else values
+        marks = [-v for v in values[::-1]] + [0.0, *values] if field.signed else values
+        ticks = [
+            {"at": round(100 * (float(field.level(v)) - first) / (last - first), 2), "text": number(v)} for v in marks
+        ]
+        state = self.state
+        state.bar_css = f"linear-gradient(to right, {css})"
+        state.bar_ticks = ticks
+        title = TITLES[state.what if state.what in TITLES else "luminance"]
+        state.bar_title = f"{title} of f, 1/sr" if not field.signed else "luminance: more (+) or less (-), 1/sr"
+
+    @property
+    def iso_values(self) -> list[float]:
+        """The values of the surfaces, 1/sr: the slider's, and below it as many as are asked for."""
+        state = self.state
+        iso, gap = _real(state.iso, 0.0), max(_real(state.iso_gap, 1.0), 0.01)
+        count = int(np.clip(_real(state.iso_count, 1), 1, volume.MOST_SURFACES))
+        return [10 ** (iso - k * gap) for k in range(count) if iso - k * gap >= np.log10(volume.FLOOR)]
+
+    def show_surfaces(self) -> None:
+        """Show the surfaces of the values that are asked for."""
+        if self.field is None:
+            return
+        values = self.iso_values
+        self.state.iso_text = ", ".join(number(v) for v in values)
+        opacity = float(np.clip(_real(self.state.opacity, 0.5), 0.02, 1.0))
+        self.scene.show_surfaces(volume.iso_surfaces(self.field, values), opacity)
+        self.draw()
+
+    def look_from(self, view: str) -> None:
+        """Look at the box from a side."""
+        if view in VIEWS:
+            self.scene.look_from(view)
+            self.draw()
+
+    def recolour(self, theme: Theme) -> None:
+        """Take other colours for paper and ink."""
+        self.scene.recolour(theme)
+        self.draw()
+
+    def draw(self) -> None:
+        """Send a picture of the scene as it is now."""
+        self.area.moved()
+        self.send()
+
+    def close(self) -> None:
+        """Free the window."""
+        self.plotter.close()
+
+
+def viewer_clicked(viewer: "Viewer") -> Any:
+    """Return what is called with a place on the picture and whether shift was down."""
+    return lambda x, y, shift: viewer.picking.clicked(x, y, shift)
+
+
+def _draw(
+    shown: Brdf,
+    chart: Chart,
+    what: volume.What,
+    other: Brdf | None,
+    slices: list[float | None],
+    with_net: bool,
+    with_knots: bool,
+) -> _Drawn:
+    field = volume.field(shown, chart, what, other)
+    net, knots = None, None
+    if isinstance(shown, SplineBrdf):
+        if with_net:
+            plain = volume.Field(field.values)
+            net = volume.net_points(shown), plain.level(volume.net_values(shown, what))
+        if with_knots:
+            knots = [volume.knot_planes(shown, axis) for axis in range(3)]
+    planes = [
+        None if at is None else volume.slice_mesh(shown, chart, axis, float(np.clip(at, 0, 1)), what, other)
+        for axis, at in enumerate(slices)
+    ]
+    return _Drawn(chart, field, net, knots, planes)
+
+
+def _real(value: Any, otherwise: float) -> float:
+    """Return a number that came from a page, or another one where it is none."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        return otherwise
+    return number if np.isfinite(number) else otherwise
