@@ -13,7 +13,6 @@ from typing import Any, Literal
 
 import numpy as np
 
-from bvbedit.api import fit
 from bvbedit.brdf.albedo import albedo
 from bvbedit.brdf.spline_brdf import SplineBrdf
 from bvbedit.edit.combining import Blend
@@ -157,12 +156,11 @@ def attempt(job: Job, again: bool = False) -> Outcome:
 def _make(recipe: Recipe, job: Job, outputs: Sequence[tuple[Output, Path]], key: str) -> tuple[str, ...]:
     """Make the outputs, and return what a user should know."""
     source = job.source.read()
-    model = source if isinstance(source, SplineBrdf) else fit(source, **_options(recipe))
+    fitted = not isinstance(source, SplineBrdf)
+    model = source if isinstance(source, SplineBrdf) else recipe.fit.fitted(source)
     # Of another material than the recipe's own the digest says nothing.
     asked = recipe if not job.many or recipe.source is None else replace(recipe, source=None)
-    document = asked.apply(model, job.source)
-    if not isinstance(source, SplineBrdf):
-        document = replace(document, source={**document.source, "fit": recipe.fit.to_dict()})
+    document = asked.apply(model, job.source, fitted=fitted)
     # Models first: tables are known to be done by being no older.
     for output, path in sorted(outputs, key=lambda made: made[1].suffix.lower() != ".bvb"):
         if path.suffix.lower() == ".bvb":
@@ -180,11 +178,6 @@ def _make(recipe: Recipe, job: Job, outputs: Sequence[tuple[Output, Path]], key:
 
 def _notes(model: SplineBrdf) -> list[str]:
     return list(model.report.get("notes", []))
-
-
-def _options(recipe: Recipe) -> dict[str, Any]:
-    options = recipe.fit.to_dict()
-    return {name: tuple(value) if isinstance(value, list) else value for name, value in options.items()}
 
 
 def _outputs(recipe: Recipe, job: Job) -> list[tuple[Output, Path]]:

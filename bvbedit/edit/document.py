@@ -16,6 +16,7 @@ import numpy as np
 from bvbedit.brdf.plausibility import Plausibility, check
 from bvbedit.brdf.spline_brdf import SplineBrdf
 from bvbedit.brdf.structure import largest_change
+from bvbedit.edit.fitting import FitOptions
 from bvbedit.edit.operation import Edit
 from bvbedit.edit.operations import edit_of
 from bvbedit.edit.paths import relative_to, seen_from
@@ -25,7 +26,7 @@ from bvbedit.io import load
 from bvbedit.io.bvb import load_recipe, save_bvb
 
 # Bytes of control points that a history keeps; of older states every eighth stays, the others are made again.
-LARGEST_HISTORY = 1 << 28
+LARGEST_HISTORY = 1 << 26
 EACH = 8
 
 
@@ -48,6 +49,14 @@ class Document:
     def of(cls, model: SplineBrdf, **source: Any) -> "Document":
         """Return a new document of a model; ``source`` tells a recipe where it came from, like file="gold.bvb"."""
         return cls(MappingProxyType({**source, "digest": digest(model)}), states=(model,))
+
+    @classmethod
+    def of_fit(cls, model: SplineBrdf, options: FitOptions, **source: Any) -> "Document":
+        """Return a new document of what ``options.fitted`` made of a measurement, for a recipe to make it again.
+
+        ``source`` tells which: file="gold.binary", or sample="gold", noise=0.01, seed=1; see ``Source.told``.
+        """
+        return cls.of(model, **source, fit=options.to_dict())
 
     @classmethod
     def open(cls, path: str | PathLike[str]) -> "Document":
@@ -88,7 +97,10 @@ class Document:
 
     def do(self, edit: Edit) -> "Document":
         """Return the document with one more edit; what could be redone is gone. Raises BvbError as the edit does."""
-        model = edit.apply(self.model)
+        return self.done(edit, edit.apply(self.model))
+
+    def done(self, edit: Edit, model: SplineBrdf) -> "Document":
+        """Return the document with one more edit that made ``model`` of its own, perhaps in another process."""
         n = self.position
         edits, states = (*self.edits[:n], edit), (*self.states[: n + 1], model)
         names = MappingProxyType({name: k for name, k in self.names.items() if k <= n})

@@ -8,13 +8,11 @@ quotes inside of these keep a text that looks like a number or a list.
 import shlex
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import MISSING, dataclass, fields
-from functools import cache
-from typing import Any, ClassVar, Literal, get_args, get_origin, get_type_hints
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 from bvbedit.brdf.spline_brdf import SplineBrdf
-from bvbedit.edit.parameters import check_numbers
-from bvbedit.errors import BvbError
+from bvbedit.edit.parameters import check_choices, check_numbers, given
 from bvbedit.spline.arguments import shown
 
 
@@ -30,9 +28,7 @@ class Edit(ABC):
 
     def __post_init__(self) -> None:
         check_numbers(self)
-        for name, allowed in _choices(type(self)).items():
-            if getattr(self, name) not in allowed:
-                raise BvbError(f"{name} is {shown(getattr(self, name))}. Choose one of {', '.join(allowed)}.")
+        check_choices(self)
 
     @abstractmethod
     def apply(self, model: SplineBrdf) -> SplineBrdf:
@@ -43,26 +39,14 @@ class Edit(ABC):
 
     def to_dict(self) -> dict[str, Any]:
         """Return ``op`` and the parameters that are not left at their defaults, as TOML and JSON can hold them."""
-        out: dict[str, Any] = {"op": self.op}
-        for f in fields(self):
-            value = getattr(self, f.name)
-            if f.name != "op" and value is not None and (f.default is MISSING or value != f.default):
-                out[f.name] = _plain(value)
-        return out
+        return {"op": self.op, **given(self)}
 
     def line(self) -> str:
         """Return the edit in a line, which ``edit_of_line`` reads."""
-        given = self.to_dict()
-        words = [given.pop("op")]
-        words += [f"{name}={shlex.quote(_written(name, value))}" for name, value in given.items()]
+        told = self.to_dict()
+        words = [told.pop("op")]
+        words += [f"{name}={shlex.quote(_written(name, value))}" for name, value in told.items()]
         return " ".join(words)
-
-
-@cache
-def _choices(kind: type) -> Mapping[str, tuple[str, ...]]:
-    """Return what the fields of an edit's class may be that are one of several texts."""
-    hints = get_type_hints(kind)
-    return {f.name: get_args(hints[f.name]) for f in fields(kind) if get_origin(hints[f.name]) is Literal}
 
 
 # Parameters that are intervals of angles.
@@ -111,10 +95,6 @@ def _number(text: str) -> int | float | str:
         except ValueError:
             continue
     return text
-
-
-def _plain(value: Any) -> Any:
-    return [_plain(inner) for inner in value] if isinstance(value, tuple) else value
 
 
 def _written(name: str, value: Any) -> str:

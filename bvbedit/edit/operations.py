@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 from bvbedit.edit.appearance import Broaden, Denoise, Gain, RaiseGrazing, Sharpen, Tint
 from bvbedit.edit.combining import Blend, MakePlausible, MovePoints
+from bvbedit.edit.fitting import Fit
 from bvbedit.edit.operation import Edit, words_of
 from bvbedit.edit.region import Region
 from bvbedit.edit.structural import Elevate, InsertKnots, Reduce, Refine, RemoveKnots, Store
@@ -28,6 +29,7 @@ KINDS: tuple[type[Edit], ...] = (
     RemoveKnots,
     Elevate,
     Reduce,
+    Fit,
     Store,
 )
 OPERATIONS: Mapping[str, type[Edit]] = {str(kind.__dataclass_fields__["op"].default): kind for kind in KINDS}
@@ -95,9 +97,11 @@ def _described(f: "Field[Any]") -> str:
     limits = f.metadata.get("limits")
     about = str(limits.about if limits else f.metadata["about"])
     if limits:
-        about += f", {limits.low:g} ... {limits.high:g}{' ' + limits.unit if limits.unit else ''}"
+        about += f", {limits}"
     if f.default is MISSING:
         return f"{about} (needed)"
     if f.default is None:
         return about
+    if isinstance(f.default, tuple):
+        return f"{about} ({','.join(map(str, f.default))})"
     return f"{about} ({str(f.default).lower() if isinstance(f.default, bool) else f.default})"

@@ -2,8 +2,9 @@
 
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, field, fields
+from functools import cache
 from numbers import Real
-from typing import Any
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 from bvbedit.errors import BvbError
 from bvbedit.spline.arguments import shown
@@ -19,15 +20,18 @@ class Limits:
     about: str
     whole: bool = False
 
+    def __str__(self) -> str:
+        ends = [f"{end:,.0f}" if self.whole else f"{end:g}" for end in (self.low, self.high)]
+        return " ... ".join(ends) + (f" {self.unit}" if self.unit else "")
+
     def checked(self, value: Any, name: str) -> Any:
         """Return numbers, single or in tuples, as floats or ints. Raises BvbError for what is none or out of bounds."""
         if isinstance(value, tuple | list):
             return tuple(self.checked(inner, name) for inner in value)
         is_one = isinstance(value, int if self.whole else Real) and not isinstance(value, bool)
         if not is_one or not self.low <= value <= self.high:
-            unit = f" {self.unit}" if self.unit else ""
             what = "whole numbers" if self.whole else "numbers"
-            raise BvbError(f"{name} is {shown(value)}. Give {what} in {self.low:g} ... {self.high:g}{unit}.")
+            raise BvbError(f"{name} is {shown(value)}. Give {what} in {self}.")
         return int(value) if self.whole else float(value)
 
 
@@ -52,3 +56,30 @@ def check_numbers(value: Any) -> None:
         given = getattr(value, name)
         if given is not None:
             object.__setattr__(value, name, limits.checked(given, name))
+
+
+def check_choices(value: Any) -> None:
+    """Check all texts among the fields of a frozen dataclass that are one of several."""
+    kind: Any = type(value)
+    for name, allowed in _choices(kind).items():
+        if getattr(value, name) not in allowed:
+            raise BvbError(f"{name} is {shown(getattr(value, name))}. Choose one of {', '.join(allowed)}.")
+
+
+@cache
+def _choices(kind: type) -> Mapping[str, tuple[str, ...]]:
+    hints = get_type_hints(kind)
+    return {f.name: get_args(hints[f.name]) for f in fields(kind) if get_origin(hints[f.name]) is Literal}
+
+
+def given(value: Any) -> dict[str, Any]:
+    """Return the fields of a dataclass that are not left at their defaults, as TOML and JSON can hold them."""
+    return {
+        f.name: _plain(inner)
+        for f, inner in ((f, getattr(value, f.name)) for f in fields(value))
+        if inner is not None and (f.default is MISSING or inner != f.default)
+    }
+
+
+def _plain(value: Any) -> Any:
+    return [_plain(inner) for inner in value] if isinstance(value, tuple) else value

@@ -17,7 +17,7 @@ file = "warm.bvb"              # or .binary, .npz; {name} stands for the source'
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -27,6 +27,7 @@ from bvbedit.brdf.materials import MATERIALS, material_named
 from bvbedit.brdf.spline_brdf import SplineBrdf
 from bvbedit.edit.combining import Blend
 from bvbedit.edit.document import Document, digest
+from bvbedit.edit.fitting import FitOptions
 from bvbedit.edit.operation import Edit, value_of
 from bvbedit.edit.operations import any_edit
 from bvbedit.edit.paths import seen_from
@@ -70,36 +71,18 @@ class Source:
     def __str__(self) -> str:
         return str(self.file or self.sample)
 
+    def told(self) -> dict[str, Any]:
+        """Return it as a document knows it, but for the digest."""
+        if self.file is not None:
+            return {"file": str(self.file)}
+        noisy = {"noise": self.noise, "seed": self.seed} if self.noise else {}
+        return {"sample": self.sample, **noisy}
+
     def read(self) -> Brdf:
         """Return the model or the measurement. Raises BvbError where the file cannot be read."""
         if self.file is not None:
             return load(self.file)
         return measure(material_named(str(self.sample)).brdf, "merl", self.noise, self.seed)
-
-
-@dataclass(frozen=True)
-class FitOptions:
-    """How a measurement becomes a model; names and meanings are those of ``fit``."""
-
-    chart: Literal["auto", "in-out", "half-diff"] = "auto"
-    encoding: Literal["auto", "linear", "root", "log"] = "auto"
-    size: tuple[int, int, int] | None = None
-    degrees: tuple[int, int, int] = (3, 3, 3)
-    knots: str = "dominant"
-    max_bytes: int | None = None
-    max_payload: int | None = None
-    tolerance: float | None = None
-    metric: str = "log_cosine_rms"
-    thorough: bool = False
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the options that are not left at their defaults."""
-        default = FitOptions()
-        return {
-            name: list(value) if isinstance(value, tuple) else value
-            for name, value in asdict(self).items()
-            if value != getattr(default, name)
-        }
 
 
 @dataclass(frozen=True)
@@ -144,9 +127,14 @@ class Recipe:
     """The file that it was read from, for messages."""
 
     def apply(
-        self, model: SplineBrdf, source: Source, *, progress: Callable[[float], object] | None = None
+        self,
+        model: SplineBrdf,
+        source: Source,
+        *,
+        fitted: bool = False,
+        progress: Callable[[float], object] | None = None,
     ) -> Document:
-        """Return the document of a model, which came from a source, after all steps.
+        """Return the document of a model, which came from a source, perhaps ``fitted`` as is asked, after all steps.
 
         Raises BvbError, with the number of the step and its line in the recipe, where one cannot be made, and where the
         recipe names a digest that is not the model's.
@@ -156,8 +144,8 @@ class Recipe:
                 f"{source} is not the model that the recipe began with: it has changed since. Remove digest from the "
                 "recipe to use it all the same."
             )
-        told = {"file": str(source.file)} if source.file is not None else _sample(source)
-        document = Document.of(model, **told)
+        told = source.told()
+        document = Document.of_fit(model, self.fit, **told) if fitted else Document.of(model, **told)
         for n, edit in enumerate(self.steps):
             try:
                 document = document.do(edit)
@@ -181,11 +169,6 @@ class Recipe:
         return (
             step if self.origin is None else f"{self.origin}, line {line_of(self.origin, ('steps', n), WHAT)}: {step}"
         )
-
-
-def _sample(source: Source) -> dict[str, Any]:
-    noisy = {"noise": source.noise, "seed": source.seed} if source.noise else {}
-    return {"sample": source.sample, **noisy}
 
 
 def read_recipe(path: str | os.PathLike[str], settings: Sequence[str] = ()) -> Recipe:

@@ -9,7 +9,8 @@ import bvbedit
 from bvbedit.edit.appearance import Gain, Tint
 from bvbedit.edit.combining import Blend
 from bvbedit.edit.document import Document, digest
-from bvbedit.edit.recipe import FitOptions, Output, Source, read_recipe, to_toml
+from bvbedit.edit.fitting import FitOptions
+from bvbedit.edit.recipe import Output, Source, read_recipe, to_toml
 from bvbedit.edit.structural import InsertKnots
 from bvbedit.errors import BvbError
 from tests.edit.samples import smooth
