@@ -121,7 +121,7 @@ def test_a_measurement_is_fitted_first_and_its_history_can_be_run(home):
     ("old", "new", "words"),
     [
         ("factor = 2", "factor = -2", ("look.toml, line 8", "factor is -2")),
-        ("factor = 2", "factr = 2", ("look.toml, line 10", "steps[1].factr is not known. Did you mean factor?")),
+        ("factor = 2", "factr = 2", ("look.toml, line 10", "step 2: factr is not known. Did you mean factor?")),
         ('op = "gain"', 'op = "gian"', ("look.toml, line 9", "gian")),
         (
             'op = "gain"\nfactor = 2',

@@ -22,10 +22,15 @@ Told = dict[KeyPath, str]
 _ONE = {"number": "a number", "integer": "a whole number", "string": "a text", "boolean": "true or false"}
 _SEVERAL = {"number": "numbers", "integer": "whole numbers", "string": "texts", "object": "tables", "array": "lists"}
 _UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
+# Lists whose entries people count, from one, and what they call one of them.
+_COUNTED = {"steps": "step", "outputs": "output"}
 
 
 def name_of(path: Sequence[Key]) -> str:
-    """Return a key path as people write it: objects[1].radius."""
+    """Return a key path as people write it: objects[1].radius, or step 3: factor."""
+    if len(path) > 1 and path[0] in _COUNTED and isinstance(path[1], int):
+        inner = name_of(path[2:])
+        return f"{_COUNTED[str(path[0])]} {path[1] + 1}{': ' if inner else ''}{inner}"
     name = ""
     for key in path:
         if isinstance(key, int):

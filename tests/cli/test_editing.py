@@ -90,6 +90,16 @@ def test_a_file_may_be_edited_in_place_and_in_another_precision(run, home):
     assert [step["op"] for step in load_recipe(path)["steps"]] == ["gain", "store"] * 3 + ["gain"]
 
 
+def test_a_model_is_fitted_anew_in_words_and_its_history_tells_how(run, home):
+    line = "fit chart=half-diff encoding=root size=6,5,4 knots=averaged"
+    answer = told(run("edit", home / "gold.bvb", home / "small.bvb", "--op", "gain factor=2", "--op", line, "--json"))
+    assert answer["size_after"] == [6, 5, 4]
+    assert 0 < answer["steps"][1]["refit_error"] < 0.01
+    assert "log_cosine_rms to the model before" in answer["steps"][1]["notes"][-1]
+    _, out, _ = run("history", home / "small.bvb", "--recipe")
+    assert 'op = "fit"\nchart = "half-diff"\nencoding = "root"\nsize = [6, 5, 4]\nknots = "averaged"\n' in out
+
+
 def test_the_storage_of_a_file_is_kept(run, home):
     bvbedit.save(smooth().stored_as(Storage("quantised", 0.003)), home / "rough.bvb")
     run("edit", home / "rough.bvb", home / "b.bvb", "--op", "gain factor=1.1")
@@ -100,6 +110,7 @@ def test_the_storage_of_a_file_is_kept(run, home):
     ("arguments", "words"),
     [
         (("gold.bvb", "o.bvb", "--op", "gain factor=nan"), ("factor is nan",)),
+        (("gold.bvb", "o.bvb", "--op", "fit size=8,8,8 tolerance=1"), ("exclude each other",)),
         (("gold.bvb", "o.bvb", "--op", "gian factor=2"), ("gian", "gain")),
         (("gold.bvb", "o.bvb", "--op", "gain factr=2"), ("factr is not known", "Did you mean factor?")),
         (

@@ -15,6 +15,7 @@ from bvbedit.brdf.problem import tabulate
 from bvbedit.brdf.spline_brdf import SplineBrdf, face_spread, keep_faces
 from bvbedit.edit.appearance import Broaden, Denoise, Gain, RaiseGrazing, Sharpen, Tint
 from bvbedit.edit.combining import Blend, MakePlausible, MovePoints
+from bvbedit.edit.fitting import Fit
 from bvbedit.edit.operation import Edit
 from bvbedit.edit.operations import KINDS
 from bvbedit.edit.parameters import limits_of
@@ -104,6 +105,29 @@ def _triples(low: float, high: float) -> st.SearchStrategy[tuple[float, float, f
     return st.tuples(*[st.floats(low, high)] * 3)
 
 
+def _fits() -> st.SearchStrategy[dict[str, object]]:
+    bounds = [
+        st.fixed_dictionaries({"size": st.tuples(*[st.integers(17, 200)] * 3)}),
+        st.fixed_dictionaries({"max_bytes": st.integers(1, 1 << 30)}),
+        st.fixed_dictionaries({"max_payload": st.integers(1, 1 << 30)}),
+        st.fixed_dictionaries({"tolerance": st.floats(1e-12, 1e12)}),
+        st.just({}),
+    ]
+    how = st.fixed_dictionaries(
+        {},
+        optional={
+            "chart": st.sampled_from(["auto", "in-out", "half-diff"]),
+            "encoding": st.sampled_from(["auto", "linear", "root", "log"]),
+            "degrees": st.tuples(*[st.integers(0, 16)] * 3),
+            "knots": st.sampled_from(["dominant", "free", "averaged", "piegl-tiller", "uniform"]),
+            "metric": st.sampled_from(["log_cosine_rms", "fores", "relative_l1"]),
+            "precision": st.sampled_from(["auto", "float16", "float32", "float64", "quantised"]),
+            "thorough": st.booleans(),
+        },
+    )
+    return st.builds(dict.__or__, st.one_of(bounds), how)
+
+
 @st.composite
 def edits(draw: st.DrawFn) -> Edit:
     """Any edit with any parameters."""
@@ -132,6 +156,8 @@ def edits(draw: st.DrawFn) -> Edit:
         given["at"] = draw(st.floats(0, 1) | st.lists(st.floats(0, 1), min_size=1, max_size=3).map(tuple))
     if kind is Reduce and draw(st.booleans()):
         given |= draw(_numbers(Reduce, "tolerance"))
+    if kind is Fit:
+        given |= draw(_fits())
     if kind is Store:
         given["precision"] = draw(st.sampled_from(["float16", "float32", "float64", "quantised"]))
         if given["precision"] == "quantised" and draw(st.booleans()):
