@@ -89,11 +89,10 @@ class Page:
         self.viewer = Viewer(self.server, self.session, passes=self._passes)
         build(self.viewer)
         self.server.controller.on_server_bind.add(self._guard)
+        self.server.add_protocol_to_configure(lambda root: root.registerLinkProtocol(_gate(self.key, self._cookie)))
         if opened is not None:
             self.server.controller.on_server_ready.add(lambda **_: opened())
-        self.viewer.list_files()
-        if self.session.current is not None:
-            self.viewer.start()
+        self.viewer.start()
         task: asyncio.Future[Any] = self.server.start(
             exec_mode="coroutine",
             host=self.host,
@@ -107,27 +106,10 @@ class Page:
         return task
 
     def _guard(self, server: Any) -> None:
-        """Let only those in who know the key: all messages of a connection without it are refused."""
-        for handler in server._ws_handlers:
-            handler.serverProtocol.updateSecret(self.key)
-            handler.serverProtocol.validateToken = self._knows
-            handler.serverProtocol.onConnect = self._connected
-        self._trusted: set[str] = set()
         server.app.on_response_prepare.append(self._leave_cookie)
 
-    def _connected(self, request: Any, client: str) -> None:
-        if hmac.compare_digest(request.cookies.get(self._cookie, "").encode(), self.key.encode()):
-            self._trusted.add(client)
-
-    async def _knows(self, token: Any, client: str) -> bool:
-        if client in self._trusted:
-            self._trusted.discard(client)
-            return True
-        return isinstance(token, str) and hmac.compare_digest(token.encode(), self.key.encode())
-
     async def _leave_cookie(self, request: Any, response: Any) -> None:
-        given = request.query.get("secret", "")
-        if hmac.compare_digest(given.encode(), self.key.encode()):
+        if _equal(request.query.get("secret", ""), self.key):
             response.set_cookie(self._cookie, self.key, httponly=True, samesite="Strict", path="/")
         response.headers["Referrer-Policy"] = "no-referrer"
         response.headers["X-Content-Type-Options"] = "nosniff"
@@ -138,6 +120,33 @@ class Page:
         """Keep what is unsaved, and stop serving."""
         await self.server.stop()
         self.viewer.end()
+
+
+def _equal(given: object, key: str) -> bool:
+    """Compare in a time that tells nothing."""
+    return isinstance(given, str) and hmac.compare_digest(given.encode(), key.encode())
+
+
+def _gate(key: str, cookie: str) -> Any:
+    """Return the protocol that lets a connection in which knows the key, or has it as a cookie."""
+    from wslink.websocket import LinkProtocol
+
+    class Gate(LinkProtocol):  # type: ignore[misc]
+        def __init__(self) -> None:
+            super().__init__()
+            self._trusted: set[str] = set()
+
+        def onConnect(self, request: Any, client: str) -> None:  # noqa: N802
+            if _equal(request.cookies.get(cookie, ""), key):
+                self._trusted.add(client)
+
+        def onClose(self, client: str) -> None:  # noqa: N802
+            self._trusted.discard(client)
+
+        async def validateToken(self, token: Any, client: str) -> bool:  # noqa: N802
+            return client in self._trusted or _equal(token, key)
+
+    return Gate()
 
 
 def view(

@@ -5,7 +5,7 @@ result is wanted, or in the worker's process; both hand their results back to th
 """
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import replace
@@ -46,7 +46,6 @@ PLACES = ("open", "save", "edit", "fit", "volume", "lobes", "preview", "figures"
 NOTHING, SOURCE, BEFORE = "nothing", "source", "before"
 # Edits that the panel offers: fitting has a panel of its own.
 OFFERED = tuple(op for op in OPERATIONS if op != "fit")
-# Knobs that mean something where they stand at first: these edits are shown when they are chosen.
 FIT_STARTS: dict[str, Any] = {
     "fit_of": "model",
     "fit_chart": "auto",
@@ -59,6 +58,7 @@ FIT_STARTS: dict[str, Any] = {
     "fit_share": 0.0,
     "fitting": False,
     "fit_result": "",
+    "can_fit_source": False,
 }
 # Seconds of quiet after which unsaved work is kept.
 KEEPING = 1.0
@@ -140,6 +140,12 @@ class Viewer:
         on(*starts(), *region_starts())(self._knob_changed)
         on("current")(self._current_changed)
 
+    def start(self) -> None:
+        """Show what is open already. Needs a running event loop."""
+        self.list_files()
+        with self.state:
+            self._changed()
+
     # What is shown
 
     @property
@@ -186,7 +192,7 @@ class Viewer:
             self.state[f"error_{place}"] = "" if error is None else words(error)
 
     @contextmanager
-    def telling(self, place: str) -> Any:
+    def telling(self, place: str) -> Iterator[None]:
         """Tell what goes wrong inside at ``place``."""
         self.state[f"error_{place}"] = ""
         try:
@@ -677,6 +683,3 @@ def _fit_words(model: SplineBrdf) -> str:
             metrics["grid"]["log_cosine_rms"], metrics["nodes"]["log_cosine_rms"]
         )
     return told
-
-
-Callback = Callable[..., Any]

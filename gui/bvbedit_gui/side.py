@@ -1,0 +1,370 @@
+"""The side of the page: editing, fitting, what is shown of the volume, and the history."""
+
+from typing import TYPE_CHECKING
+
+from trame.widgets import html
+from trame.widgets import vuetify3 as v3
+
+from bvbedit.edit.operations import OPERATIONS
+from bvbedit_gui.knobs import ANGLES, is_regional, knobs_of
+from bvbedit_gui.viewer import OFFERED
+from bvbedit_gui.widgets import COMPACT, hint, knob_row, message, number_row, select, toggle, variable
+
+if TYPE_CHECKING:
+    from bvbedit_gui.viewer import Viewer
+
+TABS = (("edit", "Edit"), ("fit", "Fit"), ("view", "View"), ("history", "History"))
+ANGLE_WORDS = {
+    "theta_h": ("θ_h", "Half angle: 0 is the middle of the highlight."),
+    "theta_d": ("θ_d", "Difference angle: 0 is light from where it is looked at, 90 the rim."),
+    "phi_d": ("φ_d", "How light and view lie around the half vector."),
+    "theta_i": ("θ_i", "Elevation of the light."),
+    "theta_o": ("θ_o", "Elevation of the view."),
+    "phi": ("φ", "Azimuth between light and view: 0 the same side, 180 the mirror side."),
+}
+
+
+def side(viewer: "Viewer") -> None:
+    """Build the side of the page."""
+    with html.Aside(classes="side", aria_label="controls"):
+        with v3.VTabs(v_model=("tab",), density="compact", grow=True, height=34):
+            for value, title in TABS:
+                v3.VTab(title, value=value, classes="text-none", min_width=0, data_test=f"tab {value}")
+        with html.Div(classes="side-room"):
+            with html.Div(v_show="tab === 'edit'"):
+                _edit(viewer)
+            with html.Div(v_show="tab === 'fit'"):
+                _fit(viewer)
+            with html.Div(v_show="tab === 'view'"):
+                _view()
+            with html.Div(v_show="tab === 'history'"):
+                _history(viewer)
+
+
+def _edit(viewer: "Viewer") -> None:
+    with v3.VAlert(v_if="!is_model", type="info", variant="tonal", density="compact", classes="ma-2 text-body-2"):
+        html.Span("A measurement cannot be edited itself. ")
+        html.A("Fit it with a model first.", href="#", click="tab = 'fit'", click_prevent=True)
+    with html.Div(v_show="is_model", classes="pa-2"):
+        items = [{"value": op, "title": op.replace("_", " ")} for op in OFFERED]
+        select("edit", "op", (f"{items}",))
+        for op in OFFERED:
+            with html.Div(v_if=f"op === '{op}'", classes="mt-1"):
+                about = OPERATIONS[op].about
+                html.P(about[0].upper() + about[1:] + ".", classes="text-caption text-medium-emphasis mb-1")
+                for knob in knobs_of(op):
+                    knob_row(knob)
+        regional = [op for op in OFFERED if is_regional(op)]
+        with html.Div(v_show=f"{regional}.includes(op)", classes="region mt-2"):
+            _region(viewer)
+        html.Div("{{ picked }}", v_show="picked", classes="text-caption mt-2 picked", data_test="picked")
+        html.Div("{{ edit_note }}", v_show="edit_note", classes="text-caption mt-1 note", data_test="edit note")
+        message("edit")
+        with html.Div(classes="d-flex align-center mt-2"):
+            v3.VBtn(
+                "Apply", color="primary", size="small", click=viewer.apply_edit, classes="mr-2", data_test="apply"
+            )
+            v3.VBtn(
+                "Cancel",
+                size="small",
+                variant="tonal",
+                click=viewer.cancel_edit,
+                disabled=("!edit_pending",),
+                data_test="cancel",
+            )
+            v3.VSpacer()
+            with v3.VSwitch(
+                label="live",
+                v_model=("live",),
+                density="compact",
+                hide_details=True,
+                color="primary",
+                classes="flex-grow-0",
+                data_test="live",
+            ):
+                hint("Shows what the knobs would do while they move. Apply makes it part of the history.")
+
+
+def _region(viewer: "Viewer") -> None:
+    with html.Div(classes="d-flex align-center"):
+        html.Span("only in a region of angles", classes="text-caption font-weight-bold")
+        v3.VSpacer()
+        v3.VBtn(
+            "everywhere", size="x-small", variant="text", classes="text-none", click=viewer.reset_region,
+            data_test="everywhere",
+        )
+    for name in ANGLES:
+        symbol, help = ANGLE_WORDS[name]
+        top = 180 if name == "phi" else 90
+        with html.Div(classes="d-flex align-center knob", data_test=f"row region_{name}"):
+            with v3.VCheckboxBtn(
+                v_model=(f"region_{name}_on",),
+                density="compact",
+                classes="flex-grow-0",
+                aria_label=f"confine to {symbol}",
+                data_test=f"region_{name}_on",
+            ):
+                hint(help)
+            html.Label(symbol, classes="text-caption region-label")
+            v3.VRangeSlider(
+                v_model=(f"region_{name}",),
+                min=(0,),
+                max=(top,),
+                step=(0.5,),
+                strict=True,
+                density="compact",
+                hide_details=True,
+                thumb_size=12,
+                track_size=3,
+                disabled=(f"!region_{name}_on",),
+                color="primary",
+                aria_label=f"{symbol} from, to",
+                data_test=f"region_{name}",
+                classes="mx-1",
+            )
+            html.Span(
+                "{{ region_%s[0] }}–{{ region_%s[1] }}°" % (name, name), classes="text-caption region-text"
+            )
+    number_row(
+        "falloff",
+        "region_falloff",
+        variable("region_falloff"),
+        0,
+        45,
+        unit="degrees",
+        high=90,
+        low=0,
+        step=0.5,
+        test="region_falloff",
+        help="How softly the effect ends outside.",
+    )
+
+
+def _fit(viewer: "Viewer") -> None:
+    with html.Div(classes="pa-2"):
+        toggle(
+            "fit_of",
+            (
+                ("source", "the measurement", "A new model of the measurement"),
+                ("model", "the present model", "This model anew, edits and all: smaller, or of another kind"),
+            ),
+            classes="mb-2",
+            disabled=("!can_fit_source || !is_model",),
+        )
+        select(
+            "chart",
+            "fit_chart",
+            ("['auto', 'half-diff', 'in-out']",),
+            help="half-diff for sharp highlights, in-out for rough materials; auto tries both.",
+            classes="mb-2",
+        )
+        select(
+            "encoding",
+            "fit_encoding",
+            ("['auto', 'root', 'log', 'linear']",),
+            help="What is approximated: root and log keep dim parts right beside a highlight.",
+            classes="mb-2",
+        )
+        select(
+            "knots",
+            "fit_knots",
+            ("['dominant', 'averaged', 'free', 'uniform', 'piegl-tiller']",),
+            help="dominant: where the material has features. averaged: by the data alone. free: moved until nothing is gained, slow.",
+            classes="mb-2",
+        )
+        toggle(
+            "fit_by",
+            (
+                ("bytes", "bytes", "The best file of so many bytes"),
+                ("tolerance", "tolerance", "The smallest file that is as near as this"),
+                ("size", "size", "So many control points"),
+                ("knee", "by itself", "As large as is worth it"),
+            ),
+            classes="mb-2",
+        )
+        with html.Div(v_if="fit_by === 'bytes'"):
+            number_row(
+                "at most",
+                "fit_kib",
+                variable("fit_kib"),
+                2,
+                256,
+                ratio=True,
+                unit="KiB",
+                low=1,
+                high=1 << 20,
+                test="fit_kib",
+                help="Of the file without its history.",
+            )
+        with html.Div(v_if="fit_by === 'tolerance'"):
+            number_row(
+                "error",
+                "fit_tolerance",
+                variable("fit_tolerance"),
+                1e-4,
+                1,
+                ratio=True,
+                low=1e-12,
+                high=1e12,
+                test="fit_tolerance",
+                help="log_cosine_rms: 0.01 is a difference that is hard to see.",
+            )
+        with html.Div(v_if="fit_by === 'size'"):
+            for axis in range(3):
+                number_row(
+                    "{{ axis_names[%d] }}" % axis,
+                    f"fit_size[{axis}]",
+                    (lambda n: lambda e: f"fit_size = fit_size.map((x, i) => i === {n} ? ({e}) : x)")(axis),
+                    4,
+                    80,
+                    whole=True,
+                    low=4,
+                    high=1000,
+                    test=f"fit_size {axis}",
+                    help="Control points along this axis.",
+                )
+        with html.Div(classes="d-flex align-center mt-2"):
+            v3.VBtn(
+                "Fit",
+                color="primary",
+                size="small",
+                click=viewer.fit,
+                disabled=("fitting || !documents.length",),
+                classes="mr-2",
+                data_test="fit",
+            )
+            v3.VBtn(
+                "Stop",
+                size="small",
+                variant="tonal",
+                click=viewer.stop_fit,
+                disabled=("!fitting",),
+                data_test="stop",
+            )
+        v3.VProgressLinear(
+            v_if="fitting",
+            model_value=("fit_share",),
+            indeterminate=("fit_share === 0",),
+            height=6,
+            color="primary",
+            classes="mt-2",
+            aria_label="share of the fit that is done",
+        )
+        html.Div("{{ fit_result }}", v_show="fit_result", classes="text-caption mt-2", data_test="fit result")
+        message("fit")
+
+
+def _view() -> None:
+    with html.Div(classes="pa-2"):
+        select(
+            "shown",
+            "what",
+            ("what_items",),
+            help="What surfaces and slices are of. A difference: more than what it is compared with, or less.",
+            classes="mb-2",
+        )
+        number_row(
+            "surfaces",
+            "iso_count",
+            variable("iso_count"),
+            1,
+            6,
+            whole=True,
+            test="iso_count",
+            help="How many: that of the slider, and others at lower values.",
+        )
+        number_row(
+            "apart by",
+            "iso_gap",
+            variable("iso_gap"),
+            0.1,
+            2,
+            unit="decades",
+            step=0.05,
+            low=0.01,
+            high=10,
+            test="iso_gap",
+            help="How far the surfaces' values are from one another.",
+        )
+        number_row(
+            "opacity",
+            "opacity",
+            variable("opacity"),
+            0.05,
+            1,
+            step=0.05,
+            low=0.02,
+            high=1,
+            test="opacity",
+            help="Lower values let inner surfaces show through.",
+        )
+        for name, label, help in (
+            ("show_net", "control net", "Control points at their Greville abscissae, large and bright where values are."),
+            ("show_knots", "knot planes", "Where the polynomial pieces meet: details can be as fine as these lie close."),
+        ):
+            with v3.VSwitch(
+                label=label,
+                v_model=(name,),
+                density="compact",
+                hide_details=True,
+                color="primary",
+                disabled=("!is_model",),
+                data_test=name,
+            ):
+                hint(help)
+        html.Div("slices", classes="text-caption font-weight-bold mt-1")
+        for axis in range(3):
+            with html.Div(classes="d-flex align-center knob"):
+                v3.VCheckboxBtn(
+                    v_model=(f"slice_{axis}_on",),
+                    density="compact",
+                    classes="flex-grow-0",
+                    aria_label=f"slice across axis {axis}",
+                    data_test=f"slice_{axis}_on",
+                )
+                html.Label("{{ axis_names[%d] }}" % axis, classes="text-caption region-label")
+                v3.VSlider(
+                    v_model=(f"slice_{axis}",),
+                    min=(0,),
+                    max=(1,),
+                    step=(0.005,),
+                    density="compact",
+                    hide_details=True,
+                    thumb_size=14,
+                    track_size=3,
+                    color="primary",
+                    disabled=(f"!slice_{axis}_on",),
+                    aria_label=f"place of the slice across axis {axis}",
+                    data_test=f"slider slice_{axis}",
+                )
+
+
+def _history(viewer: "Viewer") -> None:
+    with html.Div(classes="pa-2"):
+        with v3.VList(density="compact", classes="history", data_test="history"):
+            with v3.VListItem(
+                v_for="(step, n) in history",
+                key=("n",),
+                active=("step.here",),
+                disabled=("step.past",),
+                click=(viewer.go_to, "[step.position]"),
+                classes="px-2",
+                density="compact",
+            ):
+                with html.Div(classes="text-caption step"):
+                    html.Span("{{ step.past ? 'before' : step.position }}", classes="step-number")
+                    html.Span("{{ step.line }}")
+                    v3.VChip("{{ step.name }}", v_if="step.name", size="x-small", classes="ml-1")
+        with html.Div(v_show="is_model", classes="d-flex align-center mt-2"):
+            v3.VTextField(
+                label="name of this state",
+                v_model=("named",),
+                keydown_enter=viewer.name_state,
+                data_test="named",
+                **COMPACT,
+            )
+            v3.VBtn("Name it", size="small", variant="tonal", click=viewer.name_state, classes="ml-2")
+        html.P(
+            "Click a line to go there. Lines marked before were done before the file was opened.",
+            classes="text-caption text-medium-emphasis mt-2",
+        )

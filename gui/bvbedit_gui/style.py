@@ -1,0 +1,74 @@
+"""How the page looks, and the little that it does by itself: keys, and asking before it is left."""
+
+STYLE = """
+html { overflow: hidden !important; }
+.fill, .fill .v-application__wrap { height: 100vh; min-height: 0 !important; }
+.desk { display: flex; height: calc(100vh - 45px); }
+.panels { flex: 1; min-width: 0; display: grid; gap: 1px; background: rgba(128, 128, 128, .35);
+  grid-template-columns: minmax(0, 54fr) minmax(0, 46fr); grid-template-rows: minmax(0, 55fr) minmax(0, 45fr); }
+.panel { background: rgb(var(--v-theme-surface)); display: flex; flex-direction: column; min-width: 0; min-height: 0;
+  overflow: hidden; }
+.panel-max { grid-column: 1 / 3; grid-row: 1 / 3; }
+.panel-head { display: flex; align-items: center; height: 32px; padding: 0 4px 0 8px; flex: none; }
+.picture { flex: 1; min-height: 0; position: relative; overflow: hidden; }
+.controls { flex: none; }
+.note { opacity: .8; line-height: 1.2; flex: none; overflow-wrap: anywhere; }
+.side { width: 320px; flex: none; display: flex; flex-direction: column; border-left: 1px solid rgba(128,128,128,.35);
+  background: rgb(var(--v-theme-surface)); }
+.side-room { flex: 1; overflow-y: auto; min-height: 0; }
+.knob { min-height: 32px; }
+.knob-label { width: 62px; flex: none; line-height: 1.1; overflow-wrap: anywhere; }
+.knob-field { width: 92px; flex: none; }
+.knob-field input { font-size: 12px; padding: 0 0 0 6px !important; min-height: 26px !important; }
+.knob-field .v-field__append-inner, .knob-field .v-text-field__suffix { padding: 0 4px 0 0; font-size: 11px;
+  min-height: 26px; }
+.knob-field .v-field { --v-input-control-height: 26px; }
+.knob-field input::-webkit-outer-spin-button, .knob-field input::-webkit-inner-spin-button { -webkit-appearance: none; }
+.region-label { width: 26px; flex: none; }
+.region-text { width: 76px; flex: none; text-align: right; white-space: nowrap; }
+.region { border-top: 1px solid rgba(128, 128, 128, .35); padding-top: 6px; }
+.iso-text { width: 150px; flex: none; text-align: right; white-space: nowrap; overflow: hidden; text-overflow: ellipsis; }
+.bar { flex: none; padding: 0 14px 17px 8px; display: flex; align-items: center; }
+.bar-title { white-space: nowrap; margin-right: 12px; }
+.bar-colours { flex: 1; height: 10px; position: relative; border: 1px solid rgba(128, 128, 128, .5); }
+.bar-tick { position: absolute; top: 9px; transform: translateX(-50%); white-space: nowrap; line-height: 1.4; }
+.bar-tick::before { content: ""; position: absolute; left: 50%; top: -4px; height: 5px; border-left: 1px solid; }
+.figure-room { flex: 1; min-height: 0; position: relative; overflow: hidden; }
+.figure { position: absolute; inset: 0; }
+.figure svg { display: block; width: 100%; height: 100%; }
+.scroll { overflow-y: auto !important; }
+.probe { display: flex; gap: 12px; }
+.probe > div { flex: 1; display: flex; align-items: center; }
+.start { height: calc(100vh - 45px); }
+.start-inner { max-width: 860px; margin: 24px auto; padding: 0 16px; }
+.choices { display: flex; flex-wrap: wrap; }
+.recipe { font-size: 12px; max-height: 50vh; overflow: auto; padding: 8px; border: 1px solid rgba(128, 128, 128, .4);
+  user-select: text; }
+.step { display: flex; line-height: 1.3; overflow-wrap: anywhere; white-space: normal; }
+.step-number { width: 44px; flex: none; opacity: .6; }
+.history .v-list-item { min-height: 26px !important; }
+.v-btn-toggle { height: 26px !important; }
+.v-btn-toggle .v-btn { min-width: 30px; padding: 0 8px; height: 26px !important; text-transform: none; }
+.v-switch .v-label { font-size: 13px; }
+"""
+
+# Values that a user is typing are undone by the browser itself, so keys mean the document only elsewhere.
+SCRIPT = """
+(function () {
+  if (window.bvbeditKeys) return;
+  window.bvbeditKeys = true;
+  document.addEventListener("keydown", function (event) {
+    if (!(event.ctrlKey || event.metaKey) || event.altKey) return;
+    const typing = event.target.matches && event.target.matches("input[type=text], textarea");
+    const key = event.key.toLowerCase();
+    const name = key === "z" ? (event.shiftKey ? "redo" : "undo") : key === "y" ? "redo" : key === "s" ? "save" : "";
+    if (!name || (typing && name !== "save") || !window.trame) return;
+    event.preventDefault();
+    window.trame.trigger(name);
+  });
+  window.addEventListener("beforeunload", function (event) {
+    if (window.trame && window.trame.state.get("unsaved")) event.preventDefault();
+  });
+})();
+"""
+

@@ -1,0 +1,254 @@
+"""Small parts of the page, each used in several panels: fields with sliders, messages, pictures with a title."""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from trame.widgets import html, rca
+from trame.widgets import vuetify3 as v3
+
+from bvbedit_gui.knobs import Knob
+
+COMPACT = {"density": "compact", "hide_details": True, "variant": "outlined"}
+
+
+def message(place: str) -> None:
+    """Show what could not be done at this place, until it is closed."""
+    v3.VAlert(
+        "{{ error_%s }}" % place,
+        v_if=f"error_{place}",
+        type="error",
+        density="compact",
+        variant="tonal",
+        closable=True,
+        close_label="Close the message",
+        click_close=f"error_{place} = ''",
+        classes="ma-1 text-body-2 flex-grow-0",
+        role="alert",
+        data_place=place,
+    )
+
+
+def hint(text: str) -> None:
+    """Say more about the control that this stands in, when it is pointed at or focused."""
+    v3.VTooltip(text, activator="parent", location="start", max_width=300, open_delay=400)
+
+
+def button(
+    icon: str,
+    text: str,
+    click: Any,
+    *,
+    disabled: str = "false",
+    active: str = "false",
+    test: str = "",
+    **more: Any,
+) -> None:
+    """Show a button with an icon, named for those who do not see it and explained to those who point at it."""
+    with v3.VBtn(
+        icon=True,
+        size="small",
+        density="comfortable",
+        variant="text",
+        rounded="sm",
+        disabled=(disabled,),
+        active=(active,),
+        aria_label=text,
+        click=click,
+        data_test=test or text,
+        **more,
+    ):
+        v3.VIcon(icon)
+        v3.VTooltip(text, activator="parent", location="bottom", open_delay=400)
+
+
+def select(label: str, model: str, items: Any, *, test: str = "", help: str = "", **more: Any) -> None:
+    """Show a choice of one of several."""
+    with v3.VSelect(
+        label=label, v_model=(model,), items=items, data_test=test or model, **{**COMPACT, "class": "flex-grow-1"}, **more
+    ):
+        if help:
+            hint(help)
+
+
+def toggle(model: str, choices: Sequence[tuple[str, str, str]], **more: Any) -> None:
+    """Show buttons of which one is pressed: value, icon or text, and what it means."""
+    with v3.VBtnToggle(
+        v_model=(model,), mandatory=True, density="compact", variant="outlined", divided=True, data_test=model, **more
+    ):
+        for value, face, help in choices:
+            with v3.VBtn(value=value, size="x-small", aria_label=help, data_test=f"{model}={value}"):
+                if face.startswith("mdi-"):
+                    v3.VIcon(face)
+                else:
+                    html.Span(face)
+                v3.VTooltip(help, activator="parent", location="bottom", open_delay=400)
+
+
+def number_row(
+    label: str,
+    value: str,
+    assign: Callable[[str], str],
+    first: float,
+    last: float,
+    *,
+    ratio: bool = False,
+    whole: bool = False,
+    unit: str = "",
+    help: str = "",
+    test: str = "",
+    step: float | None = None,
+    low: float | None = None,
+    high: float | None = None,
+) -> None:
+    """Show a number as a slider and a field, with its unit and limits.
+
+    ``value`` is an expression of the page, ``assign`` makes a statement that gives it another value. The slider spans
+    ``first`` ... ``last``, in ratios if so; the field takes anything that ``low`` and ``high`` allow.
+    """
+    shown_low, shown_high = (first if low is None else low), (last if high is None else high)
+    limits = f"{shown_low:.6g} ... {shown_high:.6g}" + (f" {unit}" if unit else "")
+    with html.Div(classes="d-flex align-center knob", data_test=f"row {test}"):
+        with html.Label(label, classes="text-caption knob-label"):
+            hint(f"{help} Limits: {limits}." if help else f"Limits: {limits}.")
+        if ratio:
+            position = f"Math.log10(Math.max({value} || {first}, {first}))"
+            moved = assign("Number(Math.pow(10, $event).toPrecision(3))")
+            span = {"min": f"Math.log10({first})", "max": f"Math.log10({last})", "step": "0.005"}
+        else:
+            position = f"Number({value} ?? {first})"
+            digits = "Math.round($event)" if whole else "Number(Number($event).toPrecision(6))"
+            moved = assign(digits)
+            step = 1 if whole else step or (last - first) / 200
+            span = {"min": f"{first}", "max": f"{last}", "step": f"{step}"}
+        v3.VSlider(
+            model_value=(position,),
+            update_modelValue=moved,
+            min=(span["min"],),
+            max=(span["max"],),
+            step=(span["step"],),
+            density="compact",
+            hide_details=True,
+            thumb_size=14,
+            track_size=3,
+            color="primary",
+            aria_label=f"{label}, slider",
+            data_test=f"slider {test}",
+            classes="mx-1",
+        )
+        v3.VTextField(
+            model_value=(value,),
+            update_modelValue=assign("$event === '' ? null : Number($event)"),
+            type="number",
+            step="any",
+            density="compact",
+            variant="outlined",
+            hide_details=True,
+            single_line=True,
+            suffix={"degrees": "°"}.get(unit, unit),
+            aria_label=f"{label}, {limits}",
+            data_test=f"field {test}",
+            classes="knob-field",
+        )
+
+
+def variable(name: str) -> Callable[[str], str]:
+    """Return what assigns to a variable of the page."""
+    return lambda expression: f"{name} = {expression}"
+
+
+def element(name: str, n: int) -> Callable[[str], str]:
+    """Return what assigns to one of the numbers in a list of the page."""
+    return lambda expression: f"{name} = {name}.map((x, i) => i === {n} ? ({expression}) : x)"
+
+
+def knob_row(knob: Knob) -> None:
+    """Show the knob of an edit's parameter."""
+    if knob.kind == "switch":
+        with v3.VSwitch(
+            label=knob.label,
+            v_model=(knob.state,),
+            density="compact",
+            hide_details=True,
+            color="primary",
+            data_test=knob.state,
+        ):
+            hint(knob.help)
+    elif knob.kind == "choice":
+        select(knob.label, knob.state, (f"{list(knob.options)}",), help=knob.help)
+    elif knob.kind == "file":
+        select(
+            "the other material (.bvb)",
+            knob.state,
+            ("model_files",),
+            help="A model under the folder, saved before: that is how a recipe can name it.",
+            no_data_text="No .bvb file in the folder: save one first.",
+            click=None,
+        )
+    elif knob.kind == "axis":
+        with html.Div(classes="d-flex align-center knob"):
+            html.Label("along", classes="text-caption knob-label")
+            with v3.VBtnToggle(
+                v_model=(knob.state,), mandatory=True, density="compact", variant="outlined", divided=True
+            ):
+                for axis in range(3):
+                    v3.VBtn("{{ axis_names[%d] }}" % axis, value=(f"{axis}",), size="small")
+    else:
+        span = {
+            "ratio": knob.ratio,
+            "whole": knob.whole,
+            "unit": knob.unit,
+            "help": knob.help,
+            "low": knob.low,
+            "high": knob.high,
+        }
+        if knob.parts:
+            for n, part in enumerate(knob.parts):
+                number_row(
+                    part,
+                    f"{knob.state}[{n}]",
+                    element(knob.state, n),
+                    knob.first,
+                    knob.last,
+                    test=f"{knob.state} {n}",
+                    **span,
+                )
+        else:
+            number_row(
+                knob.label, knob.state, variable(knob.state), knob.first, knob.last, test=knob.state, **span
+            )
+
+
+@contextmanager
+def panel(name: str, title: str, head: Callable[[], None]) -> Iterator[None]:
+    """Show a panel with a title, its controls beside that, and a button that gives it all the room."""
+    hidden = f"maximised === '' || maximised === '{name}'"
+    with html.Section(
+        v_show=hidden, classes=(f"maximised === '{name}' ? 'panel panel-max' : 'panel panel-{name}'",), data_panel=name,
+        aria_label=title,
+    ):
+        with html.Div(classes="panel-head"):
+            html.H2(title, classes="text-subtitle-2 mr-2")
+            head()
+            v3.VSpacer()
+            with v3.VBtn(
+                icon=True,
+                size="x-small",
+                variant="text",
+                aria_label=f"{title}: all the room, or a part of it",
+                click=f"maximised = maximised === '{name}' ? '' : '{name}'",
+                data_test=f"maximise {name}",
+            ):
+                v3.VIcon((f"maximised === '{name}' ? 'mdi-arrow-collapse' : 'mdi-arrow-expand'",))
+        yield
+        message(name)
+
+
+def picture(name: str, area: Any, *, fps: float = 30.0) -> Callable[[], None]:
+    """Show an area; return what sends a new picture of it."""
+    with html.Div(classes="picture", data_picture=name):
+        view = rca.RemoteControlledArea(
+            name=name, display="image", image_style=("{ width: '100%', height: '100%' }",), event_throttle_ms=(30,)
+        )
+    handler = view.create_view_handler(area, encoder="jpeg", target_fps=fps, interactive_quality=80, still_quality=95)
+    return lambda: handler.update()  # noqa: PLW0108  (the handler is kept alive by this)
