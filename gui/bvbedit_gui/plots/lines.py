@@ -1,5 +1,7 @@
 """Iso-parametric lines: reflectance along one axis of a chart, the other two parameters kept."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,14 +71,15 @@ def iso_line(
     brdfs = [model] if reference is None else [model, reference]
 
     parameter = _places(knots, place[axis])
-    values = _values(brdfs, chart, axis, place, parameter)
-    for _ in range(ROUNDS):
-        more = _missing(parameter, values)
-        if len(more) == 0 or len(more) + len(parameter) > MOST:
-            break
-        order = np.argsort(np.concatenate([parameter, more]), kind="stable")
-        values = np.concatenate([values, _values(brdfs, chart, axis, place, more)], axis=1)[:, order]
-        parameter = np.concatenate([parameter, more])[order]
+    with _one_thread():
+        values = _values(brdfs, chart, axis, place, parameter)
+        for _ in range(ROUNDS):
+            more = _missing(parameter, values)
+            if len(more) == 0 or len(more) + len(parameter) > MOST:
+                break
+            order = np.argsort(np.concatenate([parameter, more]), kind="stable")
+            values = np.concatenate([values, _values(brdfs, chart, axis, place, more)], axis=1)[:, order]
+            parameter = np.concatenate([parameter, more])[order]
 
     angles = chart.angles(_points(axis, place, parameter))
     others = ", ".join(_fixed(chart, other, angles[:, other], place[other]) for other in range(3) if other != axis)
@@ -95,6 +98,22 @@ def iso_line(
         at_knots=arrays[4],
         title=f"along {_symbol(chart, axis)} at {others}",
     )
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Keep the kernels that this thread calls to itself.
+
+    So few points gain nothing from more threads, and on a busy machine these wait for one another: 100 ms were seen.
+    """
+    import numba
+
+    before = numba.get_num_threads()
+    numba.set_num_threads(1)
+    try:
+        yield
+    finally:
+        numba.set_num_threads(before)
 
 
 def _places(knots: Floats, own: float) -> Floats:
