@@ -86,7 +86,8 @@ class FitOptions:
     def fitted(self, brdf: Brdf, progress: Progress | None = None) -> SplineBrdf:
         """Return the model; ``progress`` is told the share that is done, of each net that is tried.
 
-        The report tells no source and no time, whose bytes would count: a recipe makes the same model again.
+        The report tells no source and no time, whose bytes would count: a recipe makes the same model again, bit for
+        bit where OpenBLAS has as many threads (OPENBLAS_NUM_THREADS; the commands give it one).
         Raises BvbError where there is none within the bounds.
         """
         return fitted(brdf, wished(**self.options()), progress=progress)
