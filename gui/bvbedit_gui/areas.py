@@ -16,23 +16,28 @@ if TYPE_CHECKING:
 Pixels = NDArray[np.uint8]
 # A press and a release within so many pixels are a click; beyond that something was dragged.
 CLICK = 4
+# Samples of a pixel in pictures that have come to rest; while something moves, they would take half as long again.
+SAMPLES = 8
 
 
 class SceneArea:
     """A PyVista plotter: dragging turns it, a click is reported. Smoothed only when it has come to rest."""
 
-    def __init__(self, plotter: "Plotter", clicked: Callable[[float, float, bool], object]) -> None:
+    def __init__(
+        self,
+        plotter: "Plotter",
+        clicked: Callable[[float, float, bool], object],
+        resized: Callable[[], object],
+    ) -> None:
         from trame_rca.rca import VtkRemoteControlledArea
 
         self._plotter = plotter
-        # Many samples a pixel cost three times the picture itself, and are there by default.
-        plotter.render_window.SetMultiSamples(0)
         plotter.disable_anti_aliasing()
+        plotter.render_window.SetMultiSamples(0)
         self._window = VtkRemoteControlledArea(plotter.render_window)
-        self._clicked = clicked
+        self._clicked, self._resized = clicked, resized
         self._pressed: tuple[float, float] | None = None
         self._moved = True
-        self._smooth = False
         self.drawn = 0
 
     def moved(self) -> None:
@@ -42,12 +47,8 @@ class SceneArea:
     @property
     def img_cols_rows(self) -> tuple[Pixels, int, int]:
         """Pixels (rows, columns, 3), columns and rows."""
-        if self._smooth == self._moved:
-            self._smooth = not self._moved
-            if self._smooth:
-                self._plotter.enable_anti_aliasing("ssaa")
-            else:
-                self._plotter.disable_anti_aliasing()
+        # Larger pictures that are scaled down (ssaa) would blur the text.
+        self._plotter.render_window.SetMultiSamples(0 if self._moved else SAMPLES)
         self._moved = False
         self.drawn += 1
         pixels: tuple[Pixels, int, int] = self._window.img_cols_rows
@@ -56,7 +57,9 @@ class SceneArea:
     def process_resize_event(self, width: int, height: int) -> None:
         """Take another size, in pixels."""
         self.moved()
-        self._window.process_resize_event(width, height)
+        if tuple(self._plotter.window_size) != (width, height):
+            self._window.process_resize_event(width, height)
+            self._resized()
 
     def process_interaction_event(self, event: dict[str, Any]) -> None:
         """Turn the scene, or report a click with its place and whether the shift key was down."""

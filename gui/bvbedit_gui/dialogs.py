@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from trame.widgets import html
 from trame.widgets import vuetify3 as v3
 
-from bvbedit_gui.widgets import COMPACT, message, select
+from bvbedit_gui.widgets import COMPACT, marks, message, select
 
 if TYPE_CHECKING:
     from bvbedit_gui.viewer import Viewer
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 HELP = (
     (
         "What is seen",
-        "A material is a volume: each point of the box is one way of lighting and looking, and holds a colour. Surfaces "
-        "in the box join points of equal brightness. A lobe shows how light from one direction (orange) is thrown back: "
-        "the farther, the brighter. The preview is what a renderer makes of it.",
+        "A material is a volume: each point of the box is one way of lighting and looking, and holds a colour. "
+        "Surfaces in the box join points of equal brightness. A lobe shows how light from one direction (orange) is "
+        "thrown back: the farther, the brighter. The preview is what a renderer makes of it.",
     ),
     (
         "Editing",
@@ -40,21 +40,23 @@ HELP = (
 
 @contextmanager
 def _dialog(name: str, title: str, width: int = 520) -> Iterator[None]:
-    with v3.VDialog(
-        model_value=(f"dialog === '{name}'",),
-        update_modelValue=f"dialog = $event ? '{name}' : (dialog === '{name}' ? '' : dialog)",
-        max_width=width,
-        scrollable=True,
-    ), v3.VCard(title=title, data_dialog=name):
+    with (
+        v3.VDialog(
+            model_value=(f"dialog === '{name}'",),
+            update_modelValue=f"dialog = $event ? '{name}' : (dialog === '{name}' ? '' : dialog)",
+            max_width=width,
+            scrollable=True,
+        ),
+        v3.VCard(title=title, **marks(data_dialog=name)),
+    ):
         yield
 
 
 def dialogs(viewer: "Viewer") -> None:
     """Build all dialogs."""
-    with _dialog("open", "Open"):
-        with v3.VCardText(classes="scroll", style="max-height: 65vh"):
-            _choices(viewer)
-            message("open")
+    with _dialog("open", "Open"), v3.VCardText(classes="scroll", style="max-height: 65vh"):
+        _choices(viewer)
+        message("open")
     with _dialog("save", "Save as"):
         with v3.VCardText():
             v3.VTextField(
@@ -63,7 +65,7 @@ def dialogs(viewer: "Viewer") -> None:
                 update_modelValue="save_name = $event; save_confirm = ''",
                 keydown_enter=(viewer.save_as, "[]"),
                 autofocus=True,
-                data_test="save name",
+                **marks(data_test="save name"),
                 classes="mb-3",
                 **COMPACT,
             )
@@ -88,18 +90,20 @@ def dialogs(viewer: "Viewer") -> None:
                     size="small",
                     classes="ml-2",
                     click=(viewer.save_as, "[]", "{ over: true }"),
-                    data_test="replace",
+                    **marks(data_test="replace"),
                 )
         with v3.VCardActions():
             v3.VSpacer()
             v3.VBtn("Cancel", click="dialog = ''")
-            v3.VBtn("Save", color="primary", variant="flat", click=(viewer.save_as, "[]"), data_test="save now")
+            v3.VBtn(
+                "Save", color="primary", variant="flat", click=(viewer.save_as, "[]"), **marks(data_test="save now")
+            )
     with _dialog("recipe", "Recipe", 680):
         with v3.VCardText():
             html.P(
                 "What was done, for bvbedit run: save it beside the model as a .toml file.", classes="text-caption mb-2"
             )
-            html.Pre("{{ recipe }}", classes="recipe", data_test="recipe text")
+            html.Pre("{{ recipe }}", classes="recipe", **marks(data_test="recipe text"))
             message("save")
         with v3.VCardActions():
             v3.VSpacer()
@@ -111,7 +115,7 @@ def dialogs(viewer: "Viewer") -> None:
                 click="navigator.clipboard ? navigator.clipboard.writeText(recipe).then(() => { toast = 'Copied' }, "
                 "() => { toast = 'The browser does not let pages copy: select the text' }) "
                 ": (toast = 'The browser does not let pages copy: select the text')",
-                data_test="copy",
+                **marks(data_test="copy"),
             )
     with _dialog("close", "Close without saving?", 420):
         with v3.VCardText():
@@ -120,8 +124,13 @@ def dialogs(viewer: "Viewer") -> None:
         with v3.VCardActions():
             v3.VBtn("Keep it open", click="dialog = ''; closing = null")
             v3.VSpacer()
-            v3.VBtn("Close it", color="error", click=(viewer.close, "[closing]", "{ discard: true }"), data_test="discard")
-            v3.VBtn("Save", color="primary", variant="flat", click=viewer.save, data_test="save and close")
+            v3.VBtn(
+                "Close it",
+                color="error",
+                click=(viewer.close, "[closing]", "{ discard: true }"),
+                **marks(data_test="discard"),
+            )
+            v3.VBtn("Save", color="primary", variant="flat", click=viewer.save, **marks(data_test="save and close"))
     with _dialog("help", "Help", 640):
         with v3.VCardText(classes="scroll", style="max-height: 70vh"):
             for title, text in HELP:
@@ -129,12 +138,15 @@ def dialogs(viewer: "Viewer") -> None:
                 html.P(text, classes="text-body-2")
         with v3.VCardActions():
             v3.VSpacer()
-            v3.VBtn("Close", click="dialog = ''", data_test="close help")
+            v3.VBtn("Close", click="dialog = ''", **marks(data_test="close help"))
 
 
 def start_page(viewer: "Viewer") -> None:
     """Build what is shown while nothing is open."""
-    with html.Div(v_if="!documents.length", classes="start scroll", data_test="start"), html.Div(classes="start-inner"):
+    with (
+        html.Div(v_if="!documents.length", classes="start scroll", **marks(data_test="start")),
+        html.Div(classes="start-inner"),
+    ):
         html.H1("bvbedit", classes="text-h5")
         html.P(
             "Measured materials as editable B-spline volumes. Open one, or begin with a sample.",
@@ -150,7 +162,13 @@ def _choices(viewer: "Viewer") -> None:
         html.H3("Not saved when the viewer ended", classes="text-subtitle-2")
         with html.Div(v_for="name in kept_files", key=("name",), classes="d-flex align-center"):
             html.Span("{{ name }}", classes="text-body-2 mr-2")
-            v3.VBtn("Recover", size="x-small", color="primary", click=(viewer.recover, "[name]"), data_test="recover")
+            v3.VBtn(
+                "Recover",
+                size="x-small",
+                color="primary",
+                click=(viewer.recover, "[name]"),
+                **marks(data_test="recover"),
+            )
             v3.VBtn("Discard", size="x-small", variant="text", click=(viewer.discard_kept, "[name]"))
     html.H3("Files in {{ folder }}", classes="text-subtitle-2")
     html.P(
@@ -168,18 +186,20 @@ def _choices(viewer: "Viewer") -> None:
             classes="text-none ma-1",
             loading=("opening === name",),
             click=(viewer.open_file, "[name]"),
-            data_test="file",
+            **marks(data_test="file"),
         )
     html.H3("Samples", classes="text-subtitle-2 mt-3")
-    with html.Div(classes="choices"):
-        with v3.VBtn(
+    with (
+        html.Div(classes="choices"),
+        v3.VBtn(
             v_for="sample in samples",
             key=("sample.name",),
             size="small",
             variant="tonal",
             classes="text-none ma-1",
             click=(viewer.open_sample, "[sample.name]"),
-            data_test="sample",
-        ):
-            html.Span("{{ sample.name }}")
-            v3.VTooltip("{{ sample.about }}", activator="parent", location="bottom")
+            **marks(data_test="sample"),
+        ),
+    ):
+        html.Span("{{ sample.name }}")
+        v3.VTooltip("{{ sample.about }}", activator="parent", location="bottom")

@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from pyvista import Plotter
 
 Point = tuple[float, float, float]
-# How far ticks and their labels stand off the parameter box, in edge lengths.
-TICK, TICK_LABEL = 0.025, 0.08
+# How far ticks stand off the parameter box, in edge lengths.
+TICK = 0.025
 
 
 def number(value: float) -> str:
@@ -39,19 +39,22 @@ def add_box(plotter: "Plotter", axes: tuple[Axis, Axis, Axis], colour: str, text
 
     line: dict[str, Any] = {"color": colour, "line_width": text_size / 12, "lighting": False, "reset_camera": False}
     plotter.add_mesh(pv.Cube(bounds=(0, 1, 0, 1, 0, 1)).extract_all_edges(), name="box", **line)
+    # A line of text in units of the scene, which zooming and the size of the picture change.
+    _, bottom, _, top = plotter.renderer.viewport
+    text = text_size * 2 * plotter.camera.parallel_scale / ((top - bottom) * plotter.window_size[1])
     # For each axis: where its edge begins, the way outwards from it as the camera sees it, and where the title stands
     # along and off the edge. The upright one is titled at its top, where it takes no width.
     edges = (
-        (np.array([0.0, 0.0, 0.0]), np.array([0.0, -0.7, -0.7]), 0.5, 0.23),
-        (np.array([0.0, 0.0, 0.0]), np.array([-0.7, 0.0, -0.7]), 0.5, 0.27),
-        (np.array([0.0, 1.0, 0.0]), np.array([-0.8, 0.6, 0.0]), 1.09, TICK_LABEL),
+        (np.array([0.0, 0.0, 0.0]), np.array([0.0, -0.7, -0.7]), 0.6, 3.4 * text),
+        (np.array([0.0, 0.0, 0.0]), np.array([-0.7, 0.0, -0.7]), 0.7, 4.2 * text),
+        (np.array([0.0, 1.0, 0.0]), np.array([-0.8, 0.6, 0.0]), 1 + 1.3 * text, 1.2 * text),
     )
     for n, (axis, (start, outwards, middle, off)) in enumerate(zip(axes, edges, strict=True)):
         along = np.eye(3)[n]
         at = np.array([start + t * along for t in axis.ticks])
         ticks = np.stack([at, at + TICK * outwards], axis=1).reshape(-1, 3)
         plotter.add_mesh(pv.line_segments_from_points(ticks), name=f"ticks {n}", **line)
-        write_at(plotter, at + TICK_LABEL * outwards, list(axis.labels), colour, text_size, f"labels {n}")
+        write_at(plotter, at + 1.4 * text * outwards, list(axis.labels), colour, text_size, f"labels {n}")
         title = (start + middle * along + off * outwards)[None]
         write_at(plotter, title, [axis.title], colour, text_size, f"title {n}")
 

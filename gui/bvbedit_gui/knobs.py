@@ -75,7 +75,7 @@ LOOKS: Mapping[str, str] = {
     "blend.t": "0 is this material, 1 the other one; between them it looks like both.",
     "blend.space": "linear mixes light, as two paints side by side; log keeps highlights distinct.",
     "move_points.rgb": "The reflectance that the material is to have there.",
-    "move_points.at": "Where light comes from, where it is looked at from, and the angle between; pick a point to fill it in.",
+    "move_points.at": "Light, view, and the angle between them; a control point that is picked fills it in.",
     "make_plausible.energy": "Dims what would send out more light than it receives, and glow.",
     "make_plausible.colour": "On: what is dimmed keeps its colour.",
     "insert_knots.at": "The look stays; edits can be finer there afterwards. Or click on an axis of the volume.",

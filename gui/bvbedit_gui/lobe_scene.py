@@ -12,7 +12,7 @@ from bvbedit_gui.drawing import Point, add_arrow, add_ground, look, number, writ
 if TYPE_CHECKING:
     from pyvista import Actor, Plotter, PolyData
 
-# Lobes are coloured at full brightness: white paint and chrome would vanish on white, so that it is night in all themes.
+# Lobes are coloured at full brightness: white paint and chrome would vanish on white, so it is night in all themes.
 NIGHT, CHALK, FAINT = "#33373d", "#eceff1", "#767d85"
 LIGHT, MIRROR = "#ffb000", "#56b4e9"
 LOBE_EYE, LOBE_FOCUS = (0.9, -4.0, 1.7), (0.0, 0.0, 0.46)
@@ -39,6 +39,7 @@ class LobeScene:
         self._other = self._actor("other", ambient=0.45, diffuse=0.6, **style)
         self._other.prop.interpolation = "Phong"
         self._width = 1.3
+        self._view = "oblique"
 
     def _actor(self, name: str, **style: Any) -> "Actor":
         import pyvista as pv
@@ -82,12 +83,17 @@ class LobeScene:
         width = 1.3 + shift / 2
         if width != self._width:
             self._width = width
-            self.look_from("oblique")
+            self.look_from(self._view)
 
     def look_from(self, view: str) -> None:
         """Look at the lobes from one of ``VIEWS``."""
+        self._view = view
         eye, focus = VIEWS[view]
         look(self.plotter, eye, focus, half_height=0.9 if view != "top" else 1.3, half_width=self._width)
+
+    def resized(self) -> None:
+        """Let the lobes fill the picture, which has another size now."""
+        self.look_from(self._view)
 
     def _ground(self, scale: Encoding, peak: float, mesh: "PolyData", shift: float) -> None:
         small = round(0.85 * self.text_size)

@@ -10,7 +10,7 @@ from bvbedit_gui.dialogs import dialogs, start_page
 from bvbedit_gui.preview_view import SCENES
 from bvbedit_gui.side import side
 from bvbedit_gui.style import SCRIPT, STYLE
-from bvbedit_gui.widgets import button, number_row, panel, picture, select, toggle, variable
+from bvbedit_gui.widgets import axis_name, button, marks, number_row, panel, picture, select, toggle, variable
 
 if TYPE_CHECKING:
     from bvbedit_gui.viewer import Viewer
@@ -35,7 +35,7 @@ def build(viewer: "Viewer") -> None:
                     with html.Div(classes="panels"):
                         _volume(viewer)
                         _lobes(viewer)
-                        _figures(viewer)
+                        _figures()
                         _preview(viewer)
                     side(viewer)
                 start_page(viewer)
@@ -46,12 +46,12 @@ def build(viewer: "Viewer") -> None:
                 update_modelValue="toast = ''",
                 timeout=(4000,),
                 location="bottom",
-                data_test="toast",
+                **marks(data_test="toast"),
             )
 
 
 def _bar(viewer: "Viewer") -> None:
-    with v3.VAppBar(height=44, flat=True, border=True, density="compact"):
+    with v3.VAppBar(height=44, flat=True, border=True):
         html.Span("bvbedit", classes="text-subtitle-1 font-weight-bold mx-3")
         with html.Div(style="width: 230px", v_show="documents.length"):
             select(
@@ -110,21 +110,25 @@ def _volume(viewer: "Viewer") -> None:
             ),
             classes="mr-2",
         )
-        for name, face in (("oblique", "3D"), ("0", "{{ axis_names[0] }}"), ("1", "{{ axis_names[1] }}"), ("2", "{{ axis_names[2] }}")):
+        for name, face in (
+            ("oblique", "3D"),
+            ("0", "{{ axis_names[0] }}"),
+            ("1", "{{ axis_names[1] }}"),
+            ("2", "{{ axis_names[2] }}"),
+        ):
             v3.VBtn(
                 face,
                 size="x-small",
                 variant="text",
                 min_width=30,
                 classes="px-1 text-none",
-                aria_label=f"look from side {name}",
+                **marks(aria_label=f"look from side {name}", data_test=f"look {name}"),
                 click=(view.look_from, f"['{name}']"),
-                data_test=f"look {name}",
             )
 
     with panel("volume", "Volume", head):
         view.send = picture("volume", view.area)
-        with html.Div(classes="bar", aria_label="colour bar"):
+        with html.Div(classes="bar", **marks(aria_label="colour bar")):
             html.Span("{{ bar_title }}", classes="text-caption bar-title")
             with html.Div(classes="bar-colours", style=("{ background: bar_css }",)):
                 html.Span(
@@ -140,7 +144,7 @@ def _volume(viewer: "Viewer") -> None:
 
 def _iso_row() -> None:
     """Show the slider of the iso-value, in decades within what the field spans."""
-    with html.Div(classes="d-flex align-center knob", data_test="row iso"):
+    with html.Div(classes="d-flex align-center knob", **marks(data_test="row iso")):
         html.Label("iso-value", classes="text-caption knob-label")
         v3.VSlider(
             v_model=("iso",),
@@ -152,11 +156,10 @@ def _iso_row() -> None:
             thumb_size=14,
             track_size=3,
             color="primary",
-            aria_label="iso-value, decades",
-            data_test="slider iso",
+            **marks(aria_label="iso-value, decades", data_test="slider iso"),
             classes="mx-1",
         )
-        html.Span("{{ iso_text }} /sr", classes="text-caption iso-text", data_test="iso text")
+        html.Span("{{ iso_text }} /sr", classes="text-caption iso-text", **marks(data_test="iso text"))
 
 
 def _lobes(viewer: "Viewer") -> None:
@@ -181,7 +184,7 @@ def _lobes(viewer: "Viewer") -> None:
                 min_width=30,
                 classes="px-1 text-none",
                 click=(view.look_from, f"['{name}']"),
-                data_test=f"lobe {name}",
+                **marks(data_test=f"lobe {name}"),
             )
 
     with panel("lobes", "Lobes", head):
@@ -209,7 +212,7 @@ def _lobes(viewer: "Viewer") -> None:
                 )
 
 
-def _figures(viewer: "Viewer") -> None:
+def _figures() -> None:
     def head() -> None:
         toggle(
             "figure",
@@ -222,17 +225,22 @@ def _figures(viewer: "Viewer") -> None:
         )
         with html.Div(v_show="figure === 'line'", classes="d-flex"):
             with v3.VBtnToggle(
-                v_model=("line_axis",), mandatory=True, density="compact", variant="outlined", divided=True,
-                data_test="line_axis", classes="mr-1",
+                v_model=("line_axis",),
+                mandatory=True,
+                density="compact",
+                variant="outlined",
+                divided=True,
+                **marks(data_test="line_axis"),
+                classes="mr-1",
             ):
                 for axis in range(3):
-                    v3.VBtn("{{ axis_names[%d] }}" % axis, value=(f"{axis}",), size="x-small", classes="text-none")
+                    v3.VBtn(axis_name(axis), value=(f"{axis}",), size="x-small", classes="text-none")
             toggle("line_scale", (("log", "log", "Decades"), ("linear", "lin", "Linear")))
 
     with panel("figures", "Figures", head):
         with html.Div(classes="figure-room", v_show="figure !== 'numbers'"):
             client.SizeObserver("figure_size")
-            html.Div(v_html=("figure_svg",), classes="figure", data_test="figure")
+            html.Div(v_html=("figure_svg",), classes="figure", **marks(data_test="figure"))
         with html.Div(classes="figure-room scroll", v_if="figure === 'numbers'"):
             with v3.VTable(density="compact", classes="text-caption"), html.Tbody():
                 with html.Tr(v_for="row in figure_rows", key=("row.label",)):
@@ -242,7 +250,7 @@ def _figures(viewer: "Viewer") -> None:
         with html.Div(v_show="figure === 'line'", classes="px-2 controls probe"):
             for axis in range(3):
                 with html.Div(v_show=f"line_axis !== {axis}"):
-                    html.Label("{{ axis_names[%d] }}" % axis, classes="text-caption mr-1")
+                    html.Label(axis_name(axis), classes="text-caption mr-1")
                     v3.VSlider(
                         model_value=(f"probe[{axis}]",),
                         update_modelValue=f"probe = probe.map((x, i) => i === {axis} ? Number($event.toFixed(4)) : x)",
@@ -254,8 +262,7 @@ def _figures(viewer: "Viewer") -> None:
                         thumb_size=14,
                         track_size=3,
                         color="primary",
-                        aria_label=f"place of the line along axis {axis}",
-                        data_test=f"slider probe {axis}",
+                        **marks(aria_label=f"place of the line along axis {axis}", data_test=f"slider probe {axis}"),
                     )
 
 
@@ -278,7 +285,7 @@ def _preview(viewer: "Viewer") -> None:
 
     with panel("preview", "Preview", head):
         view.send = picture("preview", view.area)
-        html.Div("{{ preview_note }}", classes="text-caption px-2 note", data_test="preview note")
+        html.Div("{{ preview_note }}", classes="text-caption px-2 note", **marks(data_test="preview note"))
         with html.Div(classes="px-2 controls"):
             number_row(
                 "exposure",
@@ -293,4 +300,3 @@ def _preview(viewer: "Viewer") -> None:
                 high=10,
                 help="Each step doubles the brightness of the picture; the material stays.",
             )
-

@@ -170,4 +170,3 @@ def composed(seen: Seen, layout: Layout, exposure: float) -> tuple[NDArray[np.ui
     gain = min(gain, LARGEST_GAIN)
     shown = np.minimum(difference * gain, 255).astype(np.uint8)
     return np.concatenate([ours, gap, theirs, gap, shown], axis=1), found, gain
-

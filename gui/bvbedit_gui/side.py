@@ -8,11 +8,10 @@ from trame.widgets import vuetify3 as v3
 from bvbedit.edit.operations import OPERATIONS
 from bvbedit_gui.knobs import ANGLES, is_regional, knobs_of
 from bvbedit_gui.viewer import OFFERED
-from bvbedit_gui.widgets import COMPACT, hint, knob_row, message, number_row, select, toggle, variable
+from bvbedit_gui.widgets import COMPACT, axis_name, hint, knob_row, marks, message, number_row, select, toggle, variable
 
 if TYPE_CHECKING:
     from bvbedit_gui.viewer import Viewer
-
 TABS = (("edit", "Edit"), ("fit", "Fit"), ("view", "View"), ("history", "History"))
 ANGLE_WORDS = {
     "theta_h": ("θ_h", "Half angle: 0 is the middle of the highlight."),
@@ -26,10 +25,10 @@ ANGLE_WORDS = {
 
 def side(viewer: "Viewer") -> None:
     """Build the side of the page."""
-    with html.Aside(classes="side", aria_label="controls"):
+    with html.Aside(classes="side", **marks(aria_label="controls")):
         with v3.VTabs(v_model=("tab",), density="compact", grow=True, height=34):
             for value, title in TABS:
-                v3.VTab(title, value=value, classes="text-none", min_width=0, data_test=f"tab {value}")
+                v3.VTab(title, value=value, classes="text-none", min_width=0, **marks(data_test=f"tab {value}"))
         with html.Div(classes="side-room"):
             with html.Div(v_show="tab === 'edit'"):
                 _edit(viewer)
@@ -57,12 +56,19 @@ def _edit(viewer: "Viewer") -> None:
         regional = [op for op in OFFERED if is_regional(op)]
         with html.Div(v_show=f"{regional}.includes(op)", classes="region mt-2"):
             _region(viewer)
-        html.Div("{{ picked }}", v_show="picked", classes="text-caption mt-2 picked", data_test="picked")
-        html.Div("{{ edit_note }}", v_show="edit_note", classes="text-caption mt-1 note", data_test="edit note")
+        html.Div("{{ picked }}", v_show="picked", classes="text-caption mt-2 picked", **marks(data_test="picked"))
+        html.Div(
+            "{{ edit_note }}", v_show="edit_note", classes="text-caption mt-1 note", **marks(data_test="edit note")
+        )
         message("edit")
-        with html.Div(classes="d-flex align-center mt-2"):
+        with html.Div(classes="foot d-flex align-center mt-2"):
             v3.VBtn(
-                "Apply", color="primary", size="small", click=viewer.apply_edit, classes="mr-2", data_test="apply"
+                "Apply",
+                color="primary",
+                size="small",
+                click=viewer.apply_edit,
+                classes="mr-2",
+                **marks(data_test="apply"),
             )
             v3.VBtn(
                 "Cancel",
@@ -70,7 +76,7 @@ def _edit(viewer: "Viewer") -> None:
                 variant="tonal",
                 click=viewer.cancel_edit,
                 disabled=("!edit_pending",),
-                data_test="cancel",
+                **marks(data_test="cancel"),
             )
             v3.VSpacer()
             with v3.VSwitch(
@@ -80,7 +86,7 @@ def _edit(viewer: "Viewer") -> None:
                 hide_details=True,
                 color="primary",
                 classes="flex-grow-0",
-                data_test="live",
+                **marks(data_test="live"),
             ):
                 hint("Shows what the knobs would do while they move. Apply makes it part of the history.")
 
@@ -90,19 +96,22 @@ def _region(viewer: "Viewer") -> None:
         html.Span("only in a region of angles", classes="text-caption font-weight-bold")
         v3.VSpacer()
         v3.VBtn(
-            "everywhere", size="x-small", variant="text", classes="text-none", click=viewer.reset_region,
-            data_test="everywhere",
+            "everywhere",
+            size="x-small",
+            variant="text",
+            classes="text-none",
+            click=viewer.reset_region,
+            **marks(data_test="everywhere"),
         )
     for name in ANGLES:
         symbol, help = ANGLE_WORDS[name]
         top = 180 if name == "phi" else 90
-        with html.Div(classes="d-flex align-center knob", data_test=f"row region_{name}"):
+        with html.Div(classes="d-flex align-center knob", **marks(data_test=f"row region_{name}")):
             with v3.VCheckboxBtn(
                 v_model=(f"region_{name}_on",),
                 density="compact",
                 classes="flex-grow-0",
-                aria_label=f"confine to {symbol}",
-                data_test=f"region_{name}_on",
+                **marks(aria_label=f"confine to {symbol}", data_test=f"region_{name}_on"),
             ):
                 hint(help)
             html.Label(symbol, classes="text-caption region-label")
@@ -118,13 +127,10 @@ def _region(viewer: "Viewer") -> None:
                 track_size=3,
                 disabled=(f"!region_{name}_on",),
                 color="primary",
-                aria_label=f"{symbol} from, to",
-                data_test=f"region_{name}",
+                **marks(aria_label=f"{symbol} from, to", data_test=f"region_{name}"),
                 classes="mx-1",
             )
-            html.Span(
-                "{{ region_%s[0] }}–{{ region_%s[1] }}°" % (name, name), classes="text-caption region-text"
-            )
+            html.Span(f"{{{{ region_{name}[0] }}}}–{{{{ region_{name}[1] }}}}°", classes="text-caption region-text")
     number_row(
         "falloff",
         "region_falloff",
@@ -148,7 +154,7 @@ def _fit(viewer: "Viewer") -> None:
                 ("source", "the measurement", "A new model of the measurement"),
                 ("model", "the present model", "This model anew, edits and all: smaller, or of another kind"),
             ),
-            classes="mb-2",
+            classes="small mb-2",
             disabled=("!can_fit_source || !is_model",),
         )
         select(
@@ -156,21 +162,21 @@ def _fit(viewer: "Viewer") -> None:
             "fit_chart",
             ("['auto', 'half-diff', 'in-out']",),
             help="half-diff for sharp highlights, in-out for rough materials; auto tries both.",
-            classes="mb-2",
+            classes="small mb-2",
         )
         select(
             "encoding",
             "fit_encoding",
             ("['auto', 'root', 'log', 'linear']",),
             help="What is approximated: root and log keep dim parts right beside a highlight.",
-            classes="mb-2",
+            classes="small mb-2",
         )
         select(
             "knots",
             "fit_knots",
             ("['dominant', 'averaged', 'free', 'uniform', 'piegl-tiller']",),
-            help="dominant: where the material has features. averaged: by the data alone. free: moved until nothing is gained, slow.",
-            classes="mb-2",
+            help="dominant: where the material has features. averaged: by the data. free: moved, slow.",
+            classes="small mb-2",
         )
         toggle(
             "fit_by",
@@ -180,7 +186,7 @@ def _fit(viewer: "Viewer") -> None:
                 ("size", "size", "So many control points"),
                 ("knee", "by itself", "As large as is worth it"),
             ),
-            classes="mb-2",
+            classes="small mb-2",
         )
         with html.Div(v_if="fit_by === 'bytes'"):
             number_row(
@@ -212,7 +218,7 @@ def _fit(viewer: "Viewer") -> None:
         with html.Div(v_if="fit_by === 'size'"):
             for axis in range(3):
                 number_row(
-                    "{{ axis_names[%d] }}" % axis,
+                    axis_name(axis),
                     f"fit_size[{axis}]",
                     (lambda n: lambda e: f"fit_size = fit_size.map((x, i) => i === {n} ? ({e}) : x)")(axis),
                     4,
@@ -231,7 +237,7 @@ def _fit(viewer: "Viewer") -> None:
                 click=viewer.fit,
                 disabled=("fitting || !documents.length",),
                 classes="mr-2",
-                data_test="fit",
+                **marks(data_test="fit"),
             )
             v3.VBtn(
                 "Stop",
@@ -239,7 +245,7 @@ def _fit(viewer: "Viewer") -> None:
                 variant="tonal",
                 click=viewer.stop_fit,
                 disabled=("!fitting",),
-                data_test="stop",
+                **marks(data_test="stop"),
             )
         v3.VProgressLinear(
             v_if="fitting",
@@ -248,9 +254,9 @@ def _fit(viewer: "Viewer") -> None:
             height=6,
             color="primary",
             classes="mt-2",
-            aria_label="share of the fit that is done",
+            **marks(aria_label="share of the fit that is done"),
         )
-        html.Div("{{ fit_result }}", v_show="fit_result", classes="text-caption mt-2", data_test="fit result")
+        html.Div("{{ fit_result }}", v_show="fit_result", classes="text-caption mt-2", **marks(data_test="fit result"))
         message("fit")
 
 
@@ -261,7 +267,7 @@ def _view() -> None:
             "what",
             ("what_items",),
             help="What surfaces and slices are of. A difference: more than what it is compared with, or less.",
-            classes="mb-2",
+            classes="small mb-2",
         )
         number_row(
             "surfaces",
@@ -299,8 +305,16 @@ def _view() -> None:
             help="Lower values let inner surfaces show through.",
         )
         for name, label, help in (
-            ("show_net", "control net", "Control points at their Greville abscissae, large and bright where values are."),
-            ("show_knots", "knot planes", "Where the polynomial pieces meet: details can be as fine as these lie close."),
+            (
+                "show_net",
+                "control net",
+                "Control points at their Greville abscissae, large and bright where values are.",
+            ),
+            (
+                "show_knots",
+                "knot planes",
+                "Where the polynomial pieces meet: details can be as fine as these lie close.",
+            ),
         ):
             with v3.VSwitch(
                 label=label,
@@ -309,7 +323,7 @@ def _view() -> None:
                 hide_details=True,
                 color="primary",
                 disabled=("!is_model",),
-                data_test=name,
+                **marks(data_test=name),
             ):
                 hint(help)
         html.Div("slices", classes="text-caption font-weight-bold mt-1")
@@ -319,10 +333,9 @@ def _view() -> None:
                     v_model=(f"slice_{axis}_on",),
                     density="compact",
                     classes="flex-grow-0",
-                    aria_label=f"slice across axis {axis}",
-                    data_test=f"slice_{axis}_on",
+                    **marks(aria_label=f"slice across axis {axis}", data_test=f"slice_{axis}_on"),
                 )
-                html.Label("{{ axis_names[%d] }}" % axis, classes="text-caption region-label")
+                html.Label(axis_name(axis), classes="text-caption region-label")
                 v3.VSlider(
                     v_model=(f"slice_{axis}",),
                     min=(0,),
@@ -334,15 +347,15 @@ def _view() -> None:
                     track_size=3,
                     color="primary",
                     disabled=(f"!slice_{axis}_on",),
-                    aria_label=f"place of the slice across axis {axis}",
-                    data_test=f"slider slice_{axis}",
+                    **marks(aria_label=f"place of the slice across axis {axis}", data_test=f"slider slice_{axis}"),
                 )
 
 
 def _history(viewer: "Viewer") -> None:
     with html.Div(classes="pa-2"):
-        with v3.VList(density="compact", classes="history", data_test="history"):
-            with v3.VListItem(
+        with (
+            v3.VList(density="compact", classes="history", **marks(data_test="history")),
+            v3.VListItem(
                 v_for="(step, n) in history",
                 key=("n",),
                 active=("step.here",),
@@ -350,17 +363,18 @@ def _history(viewer: "Viewer") -> None:
                 click=(viewer.go_to, "[step.position]"),
                 classes="px-2",
                 density="compact",
-            ):
-                with html.Div(classes="text-caption step"):
-                    html.Span("{{ step.past ? 'before' : step.position }}", classes="step-number")
-                    html.Span("{{ step.line }}")
-                    v3.VChip("{{ step.name }}", v_if="step.name", size="x-small", classes="ml-1")
+            ),
+            html.Div(classes="text-caption step"),
+        ):
+            html.Span("{{ step.past ? 'before' : step.position }}", classes="step-number")
+            html.Span("{{ step.line }}")
+            v3.VChip("{{ step.name }}", v_if="step.name", size="x-small", classes="ml-1")
         with html.Div(v_show="is_model", classes="d-flex align-center mt-2"):
             v3.VTextField(
                 label="name of this state",
                 v_model=("named",),
                 keydown_enter=viewer.name_state,
-                data_test="named",
+                **marks(data_test="named"),
                 **COMPACT,
             )
             v3.VBtn("Name it", size="small", variant="tonal", click=viewer.name_state, classes="ml-2")

@@ -16,6 +16,8 @@ html { overflow: hidden !important; }
 .side { width: 320px; flex: none; display: flex; flex-direction: column; border-left: 1px solid rgba(128,128,128,.35);
   background: rgb(var(--v-theme-surface)); }
 .side-room { flex: 1; overflow-y: auto; min-height: 0; }
+.side .v-tabs { flex: none; }
+.foot { position: sticky; bottom: 0; background: rgb(var(--v-theme-surface)); z-index: 2; padding: 4px 0; }
 .knob { min-height: 32px; }
 .knob-label { width: 62px; flex: none; line-height: 1.1; overflow-wrap: anywhere; }
 .knob-field { width: 92px; flex: none; }
@@ -27,7 +29,8 @@ html { overflow: hidden !important; }
 .region-label { width: 26px; flex: none; }
 .region-text { width: 76px; flex: none; text-align: right; white-space: nowrap; }
 .region { border-top: 1px solid rgba(128, 128, 128, .35); padding-top: 6px; }
-.iso-text { width: 150px; flex: none; text-align: right; white-space: nowrap; overflow: hidden; text-overflow: ellipsis; }
+.iso-text { width: 150px; flex: none; text-align: right; white-space: nowrap; overflow: hidden;
+  text-overflow: ellipsis; }
 .bar { flex: none; padding: 0 14px 17px 8px; display: flex; align-items: center; }
 .bar-title { white-space: nowrap; margin-right: 12px; }
 .bar-colours { flex: 1; height: 10px; position: relative; border: 1px solid rgba(128, 128, 128, .5); }
@@ -47,6 +50,10 @@ html { overflow: hidden !important; }
 .step { display: flex; line-height: 1.3; overflow-wrap: anywhere; white-space: normal; }
 .step-number { width: 44px; flex: none; opacity: .6; }
 .history .v-list-item { min-height: 26px !important; }
+.small .v-field { --v-input-control-height: 32px; --v-field-padding-top: 4px; font-size: 13px; }
+.small .v-field__input { font-size: 13px; min-height: 32px; padding: 4px 0 4px 10px; }
+.small .v-label { font-size: 12px; }
+.small .v-select__selection-text { font-size: 13px; }
 .v-btn-toggle { height: 26px !important; }
 .v-btn-toggle .v-btn { min-width: 30px; padding: 0 8px; height: 26px !important; text-transform: none; }
 .v-switch .v-label { font-size: 13px; }
@@ -71,4 +78,3 @@ SCRIPT = """
   });
 })();
 """
-

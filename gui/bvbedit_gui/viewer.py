@@ -652,8 +652,10 @@ def words(error: Exception) -> str:
 
 def _notes(model: SplineBrdf) -> str:
     notes = list(model.report.get("notes", []))
-    if model.report.get("refit_error"):
-        notes.append(f"missed by at most {model.report['refit_error']:.2g}, encoded")
+    missed = model.report.get("refit_error") or 0.0
+    # Less than a thousandth of the largest value nobody sees.
+    if missed > 1e-3 * abs(model.spline.control).max():
+        notes.append(f"missed by at most {missed:.2g} (encoded; the largest is {abs(model.spline.control).max():.2g})")
     return "; ".join(notes)
 
 

@@ -17,13 +17,16 @@ if TYPE_CHECKING:
 # whose ends are told apart by everybody and whose middle is pale.
 COLOUR_MAP, DIFFERENCE_MAP = "viridis", "PuOr_r"
 # The cameras: where they stand and where they look; seen from the side of each axis, too.
-BOX_EYE, BOX_FOCUS = (-1.5, -2.3, 1.6), (0.5, 0.5, 0.36)
+BOX_EYE, BOX_FOCUS = (-1.5, -2.3, 1.6), (0.5, 0.5, 0.44)
 VIEWS: dict[str, tuple[Point, Point]] = {
     "oblique": (BOX_EYE, BOX_FOCUS),
     "0": ((-4.0, 0.5, 0.5), (0.5, 0.5, 0.5)),
     "1": ((0.5, -4.0, 0.5), (0.5, 0.5, 0.5)),
     "2": ((0.5, 0.4999, 4.0), (0.5, 0.5, 0.5)),
 }
+# Half the height and width of the box itself, in its edge lengths, and lines of text that stand around it.
+HALVES = {"oblique": (0.73, 0.72), "side": (0.52, 0.52)}
+LINES = {"oblique": (5.0, 8.0), "side": (6.0, 9.0)}
 # Control points are drawn in so many sizes, from the darkest to the brightest, as shares of the largest.
 SIZES = (0.35, 0.5, 0.7, 1.0)
 # Of an edit that is confined to a region: control points that belong to it.
@@ -41,6 +44,7 @@ class VolumeScene:
         self.text_size = text_size
         self._theme = theme
         self._chart: Chart | None = None
+        self._view = "oblique"
         self.colours = pv.LookupTable(COLOUR_MAP)
         mesh: dict[str, Any] = {"show_scalar_bar": False, "reset_camera": False}
         self._surfaces = self._actor("surfaces", ambient=0.3, specular=0.0, **mesh)
@@ -72,14 +76,13 @@ class VolumeScene:
         """Take other colours for paper and ink."""
         self._theme = theme
         self.plotter.renderer.set_background(theme.paper)
-        if self._chart is not None:
-            add_box(self.plotter, volume.axes(self._chart), theme.ink, self.text_size)
+        self._label()
 
     def show_chart(self, chart: Chart) -> None:
         """Label the axes with what the chart's parameters mean."""
         if chart is not self._chart:
             self._chart = chart
-            add_box(self.plotter, volume.axes(chart), self._theme.ink, self.text_size)
+            self._label()
 
     def colour_by(self, low: float, high: float, *, signed: bool) -> None:
         """Let colours run between two levels."""
@@ -132,8 +135,29 @@ class VolumeScene:
 
     def look_from(self, view: str) -> None:
         """Look at the box from one of ``VIEWS``."""
+        self._view = view
         eye, focus = VIEWS[view]
-        look(self.plotter, eye, focus, half_height=1.1 if view == "oblique" else 0.75, half_width=0.87)
+        kind = "oblique" if view == "oblique" else "side"
+        half_height, half_width = (
+            half * pixels / max(pixels - lines * self.text_size, pixels / 3)
+            for half, lines, pixels in zip(HALVES[kind], LINES[kind], self._pixels()[::-1], strict=True)
+        )
+        look(self.plotter, eye, focus, half_height, half_width)
+        self._label()
+
+    def _pixels(self) -> tuple[float, float]:
+        """Return width and height of the part of the window that the scene has."""
+        left, bottom, right, top = self.plotter.renderer.viewport
+        width, height = self.plotter.window_size
+        return (right - left) * width, (top - bottom) * height
+
+    def resized(self) -> None:
+        """Let the box fill the picture, which has another size now."""
+        self.look_from(self._view)
+
+    def _label(self) -> None:
+        if self._chart is not None:
+            add_box(self.plotter, volume.axes(self._chart), self._theme.ink, self.text_size)
 
     def nearest_point(self, points: Floats, x: float, y: float, within: float) -> int | None:
         """Return which of ``points`` (n, 3) stands nearest to a place on the picture, in pixels from the lower left."""

@@ -75,7 +75,7 @@ class VolumeView:
         self.plotter = pv.Plotter(off_screen=True, window_size=[640, 480])
         self.scene = VolumeScene(self.plotter, theme, TEXT_SIZE)
         self.scene.look_from("oblique")
-        self.area = SceneArea(self.plotter, viewer_clicked(viewer))
+        self.area = SceneArea(self.plotter, viewer_clicked(viewer), self.scene.resized)
         # The page's view, once there is a page: asked to send a picture.
         self.send: Any = lambda: None
         self.field: volume.Field | None = None

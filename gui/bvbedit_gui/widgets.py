@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from html import escape
 from typing import Any
 
 from trame.widgets import html, rca
@@ -12,10 +13,20 @@ from bvbedit_gui.knobs import Knob
 COMPACT = {"density": "compact", "hide_details": True, "variant": "outlined"}
 
 
+def marks(**names: str) -> dict[str, Any]:
+    """Return attributes that no widget knows: roles and names for those who do not see, and marks for tests."""
+    return {"raw_attrs": [f'{name.replace("_", "-")}="{escape(value)}"' for name, value in names.items()]}
+
+
+def axis_name(axis: int) -> str:
+    """Return what the page writes for an axis of the present chart."""
+    return f"{{{{ axis_names[{axis}] }}}}"
+
+
 def message(place: str) -> None:
     """Show what could not be done at this place, until it is closed."""
     v3.VAlert(
-        "{{ error_%s }}" % place,
+        f"{{{{ error_{place} }}}}",
         v_if=f"error_{place}",
         type="error",
         density="compact",
@@ -24,8 +35,7 @@ def message(place: str) -> None:
         close_label="Close the message",
         click_close=f"error_{place} = ''",
         classes="ma-1 text-body-2 flex-grow-0",
-        role="alert",
-        data_place=place,
+        **marks(role="alert", data_place=place),
     )
 
 
@@ -53,9 +63,8 @@ def button(
         rounded="sm",
         disabled=(disabled,),
         active=(active,),
-        aria_label=text,
+        **marks(aria_label=text, data_test=test or text),
         click=click,
-        data_test=test or text,
         **more,
     ):
         v3.VIcon(icon)
@@ -65,7 +74,11 @@ def button(
 def select(label: str, model: str, items: Any, *, test: str = "", help: str = "", **more: Any) -> None:
     """Show a choice of one of several."""
     with v3.VSelect(
-        label=label, v_model=(model,), items=items, data_test=test or model, **{**COMPACT, "class": "flex-grow-1"}, **more
+        label=label,
+        v_model=(model,),
+        items=items,
+        **marks(data_test=test or model),
+        **{**COMPACT, "classes": "small", **more},
     ):
         if help:
             hint(help)
@@ -74,10 +87,16 @@ def select(label: str, model: str, items: Any, *, test: str = "", help: str = ""
 def toggle(model: str, choices: Sequence[tuple[str, str, str]], **more: Any) -> None:
     """Show buttons of which one is pressed: value, icon or text, and what it means."""
     with v3.VBtnToggle(
-        v_model=(model,), mandatory=True, density="compact", variant="outlined", divided=True, data_test=model, **more
+        v_model=(model,),
+        mandatory=True,
+        density="compact",
+        variant="outlined",
+        divided=True,
+        **marks(data_test=model),
+        **more,
     ):
         for value, face, help in choices:
-            with v3.VBtn(value=value, size="x-small", aria_label=help, data_test=f"{model}={value}"):
+            with v3.VBtn(value=value, size="x-small", **marks(aria_label=help, data_test=f"{model}={value}")):
                 if face.startswith("mdi-"):
                     v3.VIcon(face)
                 else:
@@ -108,7 +127,7 @@ def number_row(
     """
     shown_low, shown_high = (first if low is None else low), (last if high is None else high)
     limits = f"{shown_low:.6g} ... {shown_high:.6g}" + (f" {unit}" if unit else "")
-    with html.Div(classes="d-flex align-center knob", data_test=f"row {test}"):
+    with html.Div(classes="d-flex align-center knob", **marks(data_test=f"row {test}")):
         with html.Label(label, classes="text-caption knob-label"):
             hint(f"{help} Limits: {limits}." if help else f"Limits: {limits}.")
         if ratio:
@@ -132,8 +151,7 @@ def number_row(
             thumb_size=14,
             track_size=3,
             color="primary",
-            aria_label=f"{label}, slider",
-            data_test=f"slider {test}",
+            **marks(aria_label=f"{label}, slider", data_test=f"slider {test}"),
             classes="mx-1",
         )
         v3.VTextField(
@@ -146,8 +164,7 @@ def number_row(
             hide_details=True,
             single_line=True,
             suffix={"degrees": "°"}.get(unit, unit),
-            aria_label=f"{label}, {limits}",
-            data_test=f"field {test}",
+            **marks(aria_label=f"{label}, {limits}", data_test=f"field {test}"),
             classes="knob-field",
         )
 
@@ -171,7 +188,7 @@ def knob_row(knob: Knob) -> None:
             density="compact",
             hide_details=True,
             color="primary",
-            data_test=knob.state,
+            **marks(data_test=knob.state),
         ):
             hint(knob.help)
     elif knob.kind == "choice":
@@ -192,7 +209,7 @@ def knob_row(knob: Knob) -> None:
                 v_model=(knob.state,), mandatory=True, density="compact", variant="outlined", divided=True
             ):
                 for axis in range(3):
-                    v3.VBtn("{{ axis_names[%d] }}" % axis, value=(f"{axis}",), size="small")
+                    v3.VBtn(axis_name(axis), value=(f"{axis}",), size="small")
     else:
         span = {
             "ratio": knob.ratio,
@@ -214,9 +231,7 @@ def knob_row(knob: Knob) -> None:
                     **span,
                 )
         else:
-            number_row(
-                knob.label, knob.state, variable(knob.state), knob.first, knob.last, test=knob.state, **span
-            )
+            number_row(knob.label, knob.state, variable(knob.state), knob.first, knob.last, test=knob.state, **span)
 
 
 @contextmanager
@@ -224,8 +239,9 @@ def panel(name: str, title: str, head: Callable[[], None]) -> Iterator[None]:
     """Show a panel with a title, its controls beside that, and a button that gives it all the room."""
     hidden = f"maximised === '' || maximised === '{name}'"
     with html.Section(
-        v_show=hidden, classes=(f"maximised === '{name}' ? 'panel panel-max' : 'panel panel-{name}'",), data_panel=name,
-        aria_label=title,
+        v_show=hidden,
+        classes=(f"maximised === '{name}' ? 'panel panel-max' : 'panel panel-{name}'",),
+        **marks(data_panel=name, aria_label=title),
     ):
         with html.Div(classes="panel-head"):
             html.H2(title, classes="text-subtitle-2 mr-2")
@@ -235,9 +251,8 @@ def panel(name: str, title: str, head: Callable[[], None]) -> Iterator[None]:
                 icon=True,
                 size="x-small",
                 variant="text",
-                aria_label=f"{title}: all the room, or a part of it",
+                **marks(aria_label=f"{title}: all the room, or a part of it", data_test=f"maximise {name}"),
                 click=f"maximised = maximised === '{name}' ? '' : '{name}'",
-                data_test=f"maximise {name}",
             ):
                 v3.VIcon((f"maximised === '{name}' ? 'mdi-arrow-collapse' : 'mdi-arrow-expand'",))
         yield
@@ -246,9 +261,9 @@ def panel(name: str, title: str, head: Callable[[], None]) -> Iterator[None]:
 
 def picture(name: str, area: Any, *, fps: float = 30.0) -> Callable[[], None]:
     """Show an area; return what sends a new picture of it."""
-    with html.Div(classes="picture", data_picture=name):
+    with html.Div(classes="picture", **marks(data_picture=name)):
         view = rca.RemoteControlledArea(
             name=name, display="image", image_style=("{ width: '100%', height: '100%' }",), event_throttle_ms=(30,)
         )
     handler = view.create_view_handler(area, encoder="jpeg", target_fps=fps, interactive_quality=80, still_quality=95)
-    return lambda: handler.update()  # noqa: PLW0108  (the handler is kept alive by this)
+    return lambda: handler.update()

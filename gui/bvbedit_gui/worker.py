@@ -4,8 +4,9 @@ A fit holds the interpreter's lock for seconds, and NLopt cannot be interrupted;
 """
 
 import asyncio
-from collections.abc import Callable
-from contextlib import suppress
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
@@ -20,7 +21,7 @@ Task = Callable[..., Any]
 PAUSE = 0.03
 
 
-class Stopped(BvbError):
+class Stopped(BvbError):  # noqa: N818  (it is what the user wanted)
     """The user has stopped the work."""
 
 
@@ -38,7 +39,8 @@ class Worker:
             return
         self._pipe, other = get_context("spawn").Pipe()
         self._process = get_context("spawn").Process(target=_serve, args=(other,), daemon=True)
-        self._process.start()
+        with _one_thread():
+            self._process.start()
         other.close()
 
     async def run(self, task: Task, *args: Any, progress: Callable[[float], object] | None = None) -> Any:
@@ -82,6 +84,23 @@ class Worker:
         if process is not None:
             process.kill()
             process.join(5)
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Let processes that are started meanwhile multiply matrices by one thread, as the commands do.
+
+    By several the last bits are others, and a recipe would not make the same fit again.
+    """
+    before = os.environ.get("OPENBLAS_NUM_THREADS")
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ["OPENBLAS_NUM_THREADS"]
+        else:
+            os.environ["OPENBLAS_NUM_THREADS"] = before
 
 
 def _serve(pipe: Connection) -> None:
