@@ -29,7 +29,7 @@ app.command("bvbedit.cli.structure:elevate", help="Raise a degree: the same mate
 app.command("bvbedit.cli.structure:reduce", help="Lower a degree.")
 app.command("bvbedit.cli.structure:blend", help="Mix two materials.")
 app.command("bvbedit.cli.pictures:render", help="Render pictures.")
-app.command("bvbedit.cli.pictures:view", help="Look at volume and lobes.")
+app.command("bvbedit.cli.pictures:view", help="Open the viewer, to look and to edit; or draw a picture.")
 app.command("bvbedit.cli.samples:sample_app", name="sample", help="Sample materials, to start without a measurement.")
 app.command("bvbedit.cli.demo:demo", help="The whole job on a sample made on the spot.")
 

@@ -90,20 +90,54 @@ def render(
     )
 
 
-def view(model: Path, /, *, screenshot: Path, measured: Path | None = None, as_json: Json = False) -> None:
-    """Draw a model's iso-value surfaces, control net and lobes into a picture.
+def view(
+    *models: Path,
+    measured: Path | None = None,
+    screenshot: Path | None = None,
+    host: str = "127.0.0.1",
+    port: int | None = None,
+    browser: bool = True,
+    as_json: Json = False,
+) -> None:
+    """Open materials in the viewer, in the browser, to look at and to edit; or draw one into a picture.
 
     Parameters
     ----------
-    model
-        The .bvb file to look at.
-    screenshot
-        The .png file to write.
+    models
+        Models .bvb, measurements to fit, or none: then there are samples to begin with. Files in the present folder
+        can be opened from the page.
     measured
-        The measurement whose lobes are drawn beside the model's.
+        The measurement that the first model is compared with.
+    screenshot
+        Draw iso-value surfaces, control net and lobes of the model into this .png file instead, and end.
+    host
+        The address to listen on. Any other than this machine's own lets others in who are told the page's address.
+    port
+        The port to listen on, in place of a free one.
+    browser
+        Open the page in the browser. Without: only print its address.
     as_json
-        Print one JSON object.
+        Print one JSON object: with a screenshot.
     """
+    import bvbedit_gui
+    from bvbedit.errors import BvbError
+
+    if screenshot is None:
+        if as_json:
+            raise BvbError("--json is for --screenshot: a viewer has no result. Leave it out.")
+        bvbedit_gui.view(models, measured=measured, host=host, port=port, browser=browser, tell=_tell)
+        return
+    if len(models) != 1:
+        raise BvbError("A screenshot shows one model. Name one.")
+    _screenshot(models[0], screenshot, measured, as_json)
+
+
+def _tell(line: str) -> None:
+    # At once, also where a pipe would keep it back.
+    print(line, flush=True)
+
+
+def _screenshot(model: Path, screenshot: Path, measured: Path | None, as_json: bool) -> None:
     import bvbedit_gui
     from bvbedit import api
     from bvbedit.brdf.spline_brdf import SplineBrdf

@@ -33,8 +33,10 @@ class SceneArea:
 
         self._plotter = plotter
         plotter.disable_anti_aliasing()
-        plotter.render_window.SetMultiSamples(0)
-        self._window = VtkRemoteControlledArea(plotter.render_window)
+        window: Any = plotter.render_window
+        window.SetMultiSamples(0)
+        self._render_window = window
+        self._window = VtkRemoteControlledArea(self._render_window)
         self._clicked, self._resized = clicked, resized
         self._pressed: tuple[float, float] | None = None
         self._moved = True
@@ -48,7 +50,7 @@ class SceneArea:
     def img_cols_rows(self) -> tuple[Pixels, int, int]:
         """Pixels (rows, columns, 3), columns and rows."""
         # Larger pictures that are scaled down (ssaa) would blur the text.
-        self._plotter.render_window.SetMultiSamples(0 if self._moved else SAMPLES)
+        self._render_window.SetMultiSamples(0 if self._moved else SAMPLES)
         self._moved = False
         self.drawn += 1
         pixels: tuple[Pixels, int, int] = self._window.img_cols_rows

@@ -1,7 +1,7 @@
 """What scenes are drawn with: text, the parameter box, arrows, rings and cameras, put into the current renderer."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 import numpy as np
 
@@ -123,9 +123,10 @@ def write(
 def write_at(plotter: "Plotter", points: Floats, labels: list[str], colour: str, text_size: int, name: str) -> None:
     """Write ``labels`` centred at ``points`` (n, 3) of the scene, in front of everything; without any, remove them."""
     if not labels:
-        plotter.remove_actor(name, reset_camera=False)
+        cast(Any, plotter).remove_actor(name, reset_camera=False)
         return
-    plotter.add_point_labels(
+    # PyVista's decorator hides the signature from type checkers.
+    cast(Any, plotter).add_point_labels(
         points,
         labels,
         name=name,
@@ -159,5 +160,5 @@ def on_screen(plotter: "Plotter", points: Floats) -> Floats:
     matrix = renderer.camera.GetCompositeProjectionTransformMatrix(renderer.GetTiledAspectRatio(), -1, 1)
     projection = np.array([[matrix.GetElement(i, j) for j in range(4)] for i in range(4)])
     seen = np.concatenate([points, np.ones((len(points), 1))], axis=1) @ projection.T
-    width, height = plotter.render_window.GetSize()
+    width, height = plotter.window_size
     return np.asarray((seen[:, :2] / seen[:, 3:] + 1) / 2 * [width, height])

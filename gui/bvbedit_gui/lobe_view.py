@@ -48,7 +48,7 @@ class LobeView:
         wanted = other if beside != "none" else None
         self.queue.ask(
             lambda: (_lobe(shown, theta_i), None if wanted is None else _lobe(wanted, theta_i)),
-            lambda made: self._show(*made, theta_i, beside),
+            lambda made: self._show(made[0], made[1], theta_i, beside),
         )
 
     def _show(self, mesh: Any, other: Any, theta_i: float, beside: Any) -> None:

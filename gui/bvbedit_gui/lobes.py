@@ -91,7 +91,8 @@ def scaled(mesh: "PolyData", scale: Encoding, peak: float) -> "PolyData":
     length = np.minimum(np.asarray(mesh.point_data[LENGTH]), peak)
     radius = scale.encode(length) / scale.encode(np.array(peak))
     out.points = np.asarray(mesh.point_data["direction"]) * radius[:, None]
-    return out.compute_normals(cell_normals=False, split_vertices=False, consistent_normals=False)
+    smooth: PolyData = out.compute_normals(cell_normals=False, split_vertices=False, consistent_normals=False)
+    return smooth
 
 
 def wire(mesh: "PolyData") -> "PolyData":

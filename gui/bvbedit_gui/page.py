@@ -241,12 +241,15 @@ def _figures() -> None:
         with html.Div(classes="figure-room", v_show="figure !== 'numbers'"):
             client.SizeObserver("figure_size")
             html.Div(v_html=("figure_svg",), classes="figure", **marks(data_test="figure"))
-        with html.Div(classes="figure-room scroll", v_if="figure === 'numbers'"):
-            with v3.VTable(density="compact", classes="text-caption"), html.Tbody():
-                with html.Tr(v_for="row in figure_rows", key=("row.label",)):
-                    html.Td("{{ row.label }}")
-                    html.Td("{{ row.value }}", classes="text-no-wrap")
-                    html.Td("{{ row.help }}", classes="text-medium-emphasis")
+        with (
+            html.Div(classes="figure-room scroll", v_if="figure === 'numbers'"),
+            v3.VTable(density="compact", classes="text-caption"),
+            html.Tbody(),
+            html.Tr(v_for="row in figure_rows", key=("row.label",)),
+        ):
+            html.Td("{{ row.label }}")
+            html.Td("{{ row.value }}", classes="text-no-wrap")
+            html.Td("{{ row.help }}", classes="text-medium-emphasis")
         with html.Div(v_show="figure === 'line'", classes="px-2 controls probe"):
             for axis in range(3):
                 with html.Div(v_show=f"line_axis !== {axis}"):

@@ -120,7 +120,7 @@ class Picking:
         try:
             region = region_of(self.state)
             if region and is_regional(self.state.op):
-                named = {k: tuple(v) if isinstance(v, list) else v for k, v in region.items()}
+                named: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in region.items()}
                 chosen = points[Region(**named).weights(model.chart, points) > BELONGS]
         except (BvbError, TypeError, ValueError):
             pass  # told beside the knobs

@@ -99,7 +99,7 @@ class PreviewView:
             exposure = min(max(float(self.state.exposure), -10.0), 10.0)
         except (TypeError, ValueError):
             exposure = 0.0
-        layout = self.state.layout if self.state.layout in LAYOUTS else "alone"
+        layout: Layout = self.state.layout if self.state.layout in LAYOUTS else "alone"
         picture, found, gain = composed(seen, layout, exposure)
         told = f"{seen.samples} samples a pixel"
         if found is not None:

@@ -18,11 +18,12 @@ from bvbedit.brdf.spline_brdf import SplineBrdf
 from bvbedit.edit.document import Document
 from bvbedit.edit.fitting import Fit, FitOptions
 from bvbedit.edit.operation import Edit
+from bvbedit.edit.operations import OPERATIONS
 from bvbedit.errors import BvbError
 from bvbedit_gui import places as files
 from bvbedit_gui import tasks
 from bvbedit_gui.figures_view import FiguresView
-from bvbedit_gui.knobs import OPERATIONS, edit_from, knobs_of, region_starts, starts
+from bvbedit_gui.knobs import edit_from, knobs_of, region_starts, starts
 from bvbedit_gui.latest import Latest
 from bvbedit_gui.lobe_view import LobeView
 from bvbedit_gui.picking import Picking
@@ -662,7 +663,7 @@ def _notes(model: SplineBrdf) -> str:
 def _told(document: Document) -> list[dict[str, Any]]:
     names = {position: name for name, position in document.names.items()}
     past = [{"position": -1, "line": edit.line(), "past": True, "here": False, "name": ""} for edit in document.past]
-    start = {"position": 0, "line": "as opened", "past": False, "here": document.position == 0}
+    start: dict[str, Any] = {"position": 0, "line": "as opened", "past": False, "here": document.position == 0}
     steps = [
         {"position": n + 1, "line": edit.line(), "past": False, "here": document.position == n + 1}
         for n, edit in enumerate(document.edits)

@@ -152,8 +152,8 @@ def slice_mesh(
     import pyvista as pv
 
     line = np.linspace(0, 1, SLICE_NODES)
-    axes = (line, line, line)
-    axes = (*axes[:axis], np.array([at]), *axes[axis + 1 :])
+    across = np.array([at])
+    axes = (across if axis == 0 else line, across if axis == 1 else line, across if axis == 2 else line)
     rgb = sampled(brdf, chart, axes)
     if what == "difference":
         assert reference is not None

@@ -8,14 +8,13 @@ from bvbedit.brdf.charts import Chart
 from bvbedit.brdf.geometry import Floats
 from bvbedit_gui import volume
 from bvbedit_gui.drawing import Point, add_box, axis_edges, look, on_screen
-from bvbedit_gui.themes import Theme
+from bvbedit_gui.themes import COLOUR_MAP, Theme
 
 if TYPE_CHECKING:
     from pyvista import Actor, DataSet, Plotter, PolyData
 
-# Safe for the colour-blind, and its lightness rises steadily, so that it survives a grey print; of differences one
-# whose ends are told apart by everybody and whose middle is pale.
-COLOUR_MAP, DIFFERENCE_MAP = "viridis", "PuOr_r"
+# Of differences: its ends are told apart by everybody, and its middle is pale.
+DIFFERENCE_MAP = "PuOr_r"
 # The cameras: where they stand and where they look; seen from the side of each axis, too.
 BOX_EYE, BOX_FOCUS = (-1.5, -2.3, 1.6), (0.5, 0.5, 0.44)
 VIEWS: dict[str, tuple[Point, Point]] = {
@@ -67,8 +66,9 @@ class VolumeScene:
         # An empty mesh cannot be added, but can be put in the place of another one later.
         placeholder = pv.PolyData(np.zeros((1, 3)))
         placeholder.point_data[volume.LEVEL] = np.zeros(1)
-        coloured = {} if "color" in style else {"scalars": volume.LEVEL}
-        actor: Actor = self.plotter.add_mesh(placeholder, name=name, **coloured, **style)
+        if "color" not in style:
+            style["scalars"] = volume.LEVEL
+        actor: Actor = self.plotter.add_mesh(placeholder, name=name, **style)
         _give(actor, pv.PolyData())
         return actor
 
@@ -86,7 +86,8 @@ class VolumeScene:
 
     def colour_by(self, low: float, high: float, *, signed: bool) -> None:
         """Let colours run between two levels."""
-        self.colours.cmap = DIFFERENCE_MAP if signed else COLOUR_MAP
+        colours: Any = self.colours
+        colours.cmap = DIFFERENCE_MAP if signed else COLOUR_MAP
         self.colours.scalar_range = (low, high)
         for actor in (self._surfaces, *self._slices, *self._net):
             actor.mapper.scalar_range = (low, high)

@@ -12,8 +12,8 @@ from bvbedit.brdf.spline_brdf import SplineBrdf
 from bvbedit_gui import volume
 from bvbedit_gui.areas import SceneArea
 from bvbedit_gui.drawing import number
-from bvbedit_gui.themes import Theme
-from bvbedit_gui.volume_scene import COLOUR_MAP, DIFFERENCE_MAP, VIEWS, VolumeScene
+from bvbedit_gui.themes import COLOUR_MAP, Theme
+from bvbedit_gui.volume_scene import DIFFERENCE_MAP, VIEWS, VolumeScene
 
 if TYPE_CHECKING:
     from pyvista import PolyData, StructuredGrid
@@ -106,7 +106,9 @@ class VolumeView:
         if shown is None:
             return
         state = self.state
-        what = state.what if state.what in TITLES and (other is not None or state.what != "difference") else "luminance"
+        what: volume.What = (
+            state.what if state.what in TITLES and (other is not None or state.what != "difference") else "luminance"
+        )
         slices = [float(state[f"slice_{n}"]) if state[f"slice_{n}_on"] else None for n in range(3)]
         wanted = bool(state.show_net), bool(state.show_knots)
         self.queue.ask(lambda: _draw(shown, chart, what, other, slices, *wanted), self._show)

@@ -211,7 +211,7 @@ def knob_row(knob: Knob) -> None:
                 for axis in range(3):
                     v3.VBtn(axis_name(axis), value=(f"{axis}",), size="small")
     else:
-        span = {
+        span: dict[str, Any] = {
             "ratio": knob.ratio,
             "whole": knob.whole,
             "unit": knob.unit,
