@@ -115,8 +115,13 @@ class Document:
         return self.go_to(self.position + by)
 
     def go_to(self, state: "int | str") -> "Document":
-        """Return the document at any state of its history. Raises BvbError for one that there is not."""
-        return replace(self, position=self._position(state))
+        """Return the document at any state of its history. Raises BvbError for one that there is not.
+
+        A state that was dropped is made again, once.
+        """
+        position = self._position(state)
+        states = (*self.states[:position], self.at(position), *self.states[position + 1 :])
+        return replace(self, position=position, states=states)
 
     def named(self, name: str) -> "Document":
         """Return the document with a name for its present state, to go back to or compare with."""

@@ -194,12 +194,13 @@ def _choices(viewer: "Viewer") -> None:
         v3.VBtn(
             v_for="sample in samples",
             key=("sample.name",),
-            size="small",
             variant="tonal",
-            classes="text-none ma-1",
+            classes="text-none ma-1 sample",
+            height="auto",
             click=(viewer.open_sample, "[sample.name]"),
             **marks(data_test="sample"),
         ),
+        html.Div(classes="sample-inner"),
     ):
-        html.Span("{{ sample.name }}")
-        v3.VTooltip("{{ sample.about }}", activator="parent", location="bottom")
+        html.Div("{{ sample.name }}", classes="font-weight-bold")
+        html.Div("{{ sample.about }}", classes="text-caption sample-about")

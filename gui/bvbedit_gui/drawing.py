@@ -12,8 +12,6 @@ if TYPE_CHECKING:
     from pyvista import Plotter
 
 Point = tuple[float, float, float]
-# How far ticks stand off the parameter box, in edge lengths.
-TICK = 0.025
 
 
 def number(value: float) -> str:
@@ -30,10 +28,12 @@ def font(bold: bool = False) -> str:
     )
 
 
-def add_box(plotter: "Plotter", axes: tuple[Axis, Axis, Axis], colour: str, text_size: int) -> None:
+def add_box(
+    plotter: "Plotter", axes: tuple[Axis, Axis, Axis], colour: str, text_size: int, hidden: int | None = None
+) -> None:
     """Add the unit cube's edges, and ticks and titles along the three edges that the camera sees outermost.
 
-    ``text_size`` in pixels. What was there before is replaced.
+    ``text_size`` in pixels; ``hidden`` is the axis that the camera looks along. What was there before is replaced.
     """
     import pyvista as pv
 
@@ -45,18 +45,19 @@ def add_box(plotter: "Plotter", axes: tuple[Axis, Axis, Axis], colour: str, text
     # For each axis: where its edge begins, the way outwards from it as the camera sees it, and where the title stands
     # along and off the edge. The upright one is titled at its top, where it takes no width.
     edges = (
-        (np.array([0.0, 0.0, 0.0]), np.array([0.0, -0.7, -0.7]), 0.6, 3.4 * text),
-        (np.array([0.0, 0.0, 0.0]), np.array([-0.7, 0.0, -0.7]), 0.7, 4.2 * text),
+        (np.array([0.0, 0.0, 0.0]), np.array([0.25, -0.7, -0.7]), 0.6, 3.2 * text),
+        (np.array([0.0, 0.0, 0.0]), np.array([-0.8, 0.0, -0.5]), 0.52, 6.2 * text),
         (np.array([0.0, 1.0, 0.0]), np.array([-0.8, 0.6, 0.0]), 1 + 1.3 * text, 1.2 * text),
     )
     for n, (axis, (start, outwards, middle, off)) in enumerate(zip(axes, edges, strict=True)):
         along = np.eye(3)[n]
         at = np.array([start + t * along for t in axis.ticks])
-        ticks = np.stack([at, at + TICK * outwards], axis=1).reshape(-1, 3)
+        ticks = np.stack([at, at + 0.5 * text * outwards], axis=1).reshape(-1, 3)
         plotter.add_mesh(pv.line_segments_from_points(ticks), name=f"ticks {n}", **line)
-        write_at(plotter, at + 1.4 * text * outwards, list(axis.labels), colour, text_size, f"labels {n}")
+        labels, named = ([], []) if n == hidden else (list(axis.labels), [axis.title])
+        write_at(plotter, at + (2.2 if n else 1.6) * text * outwards, labels, colour, text_size, f"labels {n}")
         title = (start + middle * along + off * outwards)[None]
-        write_at(plotter, title, [axis.title], colour, text_size, f"title {n}")
+        write_at(plotter, title, named, colour, text_size, f"title {n}")
 
 
 def axis_edges() -> Floats:
@@ -81,16 +82,17 @@ def add_arrow(plotter: "Plotter", start: Floats, end: Floats, colour: str, name:
     plotter.add_mesh(arrow, color=colour, ambient=0.5, name=name, reset_camera=False)
 
 
-def add_ground(plotter: "Plotter", radii: list[float], colour: str, text_size: int) -> None:
-    """Add rings of these radii and rays every 30 degrees on the plane of the surface."""
+def add_ground(plotter: "Plotter", radii: list[float], places: tuple[float, ...], colour: str, text_size: int) -> None:
+    """Add rings of these radii and rays every 30 degrees on the plane of the surface, around ``places`` along x."""
     import pyvista as pv
 
     line: dict[str, Any] = {"color": colour, "line_width": text_size / 15, "lighting": False, "reset_camera": False}
     phi = np.linspace(0, 2 * np.pi, 181)
-    circles = pv.merge([pv.lines_from_points(r * spherical(np.pi / 2, phi)) for r in (1.0, *radii)])
-    plotter.add_mesh(circles, name="rings", **line)
+    middles = [np.array([x, 0.0, 0.0]) for x in places]
+    circles = [pv.lines_from_points(x + r * spherical(np.pi / 2, phi)) for r in (1.0, *radii) for x in middles]
+    plotter.add_mesh(pv.merge(circles), name="rings", **line)
     rays = spherical(np.pi / 2, np.radians(np.arange(0, 180, 30)))
-    segments = np.stack([-rays, rays], axis=1).reshape(-1, 3)
+    segments = np.concatenate([x + np.stack([-rays, rays], axis=1).reshape(-1, 3) for x in middles])
     plotter.add_mesh(pv.line_segments_from_points(segments), name="rays", **line)
 
 

@@ -59,6 +59,8 @@ PARTS: Mapping[str, tuple[str, ...]] = {
     "move_points.rgb": ("red", "green", "blue"),
     "move_points.at": ("θ_i", "θ_o", "φ"),
 }
+# What a knob is called, where the parameter's name is a symbol.
+LABELS: Mapping[str, str] = {"blend.t": "share"}
 # What a knob does to the look, beyond what its parameter is.
 LOOKS: Mapping[str, str] = {
     "gain.factor": "2 makes the material twice as bright, 0.5 half as bright.",
@@ -133,7 +135,7 @@ def _knob(op: str, f: "Field[Any]", hint: Any) -> Knob:
     key = f"{op}.{f.name}"
     limits = f.metadata.get("limits")
     about = str(limits.about if limits else f.metadata["about"])
-    label = f.name.replace("_", " ")
+    label = LABELS.get(key, f.name.replace("_", " "))
     start = STARTS.get(key, None if f.default is MISSING else f.default)
     told = " ".join(part for part in (about[0].upper() + about[1:] + ".", LOOKS.get(key, "")) if part)
     if limits is None:

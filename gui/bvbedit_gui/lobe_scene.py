@@ -98,9 +98,8 @@ class LobeScene:
     def _ground(self, scale: Encoding, peak: float, mesh: "PolyData", shift: float) -> None:
         small = round(0.85 * self.text_size)
         marks = lobes.rings(scale, peak)
-        add_ground(self.plotter, [radius for _, radius in marks], FAINT, self.text_size)
-        for name in ("rings", "rays"):
-            self.plotter.actors[name].position = (-shift / 2, 0.0, 0.0)
+        middles = (0.0,) if shift == 0 else (-shift / 2, shift / 2)
+        add_ground(self.plotter, [radius for _, radius in marks], middles, FAINT, self.text_size)
         for n, (length, radius) in enumerate(marks):
             # Front left: beside the lobe, and the rings are well apart there.
             at = radius * spherical(np.pi / 2, np.radians(-140.0))

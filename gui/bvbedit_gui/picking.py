@@ -65,7 +65,7 @@ class Picking:
         for k, name in enumerate(names):
             low, high = float(angles[:, k].min()), float(angles[:, k].max())
             self.state[f"region_{name}_on"] = True
-            self.state[f"region_{name}"] = [round(low, 2), round(high, 2)]
+            self.state[f"region_{name}"] = [round(low, 1), round(high, 1)]
         for name in (*HALF_ANGLES, *PLAIN_ANGLES):
             if name not in names:
                 self.state[f"region_{name}_on"] = False

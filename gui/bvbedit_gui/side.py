@@ -155,7 +155,7 @@ def _fit(viewer: "Viewer") -> None:
                 ("model", "the present model", "This model anew, edits and all: smaller, or of another kind"),
             ),
             classes="small mb-2",
-            disabled=("!can_fit_source || !is_model",),
+            v_show="can_fit_source && is_model",
         )
         select(
             "chart",

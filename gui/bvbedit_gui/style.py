@@ -2,6 +2,7 @@
 
 STYLE = """
 html { overflow: hidden !important; }
+.v-theme--dark { --v-theme-surface: 30, 33, 38 !important; --v-theme-background: 30, 33, 38 !important; }
 .fill, .fill .v-application__wrap { height: 100vh; min-height: 0 !important; }
 .desk { display: flex; height: calc(100vh - 45px); }
 .panels { flex: 1; min-width: 0; display: grid; gap: 1px; background: rgba(128, 128, 128, .35);
@@ -45,11 +46,16 @@ html { overflow: hidden !important; }
 .start { height: calc(100vh - 45px); }
 .start-inner { max-width: 860px; margin: 24px auto; padding: 0 16px; }
 .choices { display: flex; flex-wrap: wrap; }
+.sample { width: 265px; justify-content: flex-start; padding: 8px 12px; }
+.sample-inner { text-align: left; white-space: normal; width: 240px; letter-spacing: normal; }
+.sample-about { opacity: .75; line-height: 1.25; min-height: 2.5em; }
 .recipe { font-size: 12px; max-height: 50vh; overflow: auto; padding: 8px; border: 1px solid rgba(128, 128, 128, .4);
   user-select: text; }
 .step { display: flex; line-height: 1.3; overflow-wrap: anywhere; white-space: normal; }
 .step-number { width: 44px; flex: none; opacity: .6; }
 .history .v-list-item { min-height: 26px !important; }
+.v-app-bar .small, .panel-head .small { margin-top: 5px; }
+.panel-head .small { margin-top: 0; }
 .small .v-field { --v-input-control-height: 32px; --v-field-padding-top: 4px; font-size: 13px; }
 .small .v-field__input { font-size: 13px; min-height: 32px; padding: 4px 0 4px 10px; }
 .small .v-label { font-size: 12px; }

@@ -500,28 +500,28 @@ class Viewer:
             await self._do(self.session.document, InsertKnots(axis=axis, at=round(at, 4)))
             self.state.toast = f"A knot at {at:.4f} of {self.state.axis_names[axis]}"
 
-    def undo(self) -> None:
+    async def undo(self) -> None:
         """Take the last edit back; an edit that is being tried is taken back first."""
         if self.pending is not None:
             self.cancel_edit()
-            return
-        with self.telling("edit"):
-            if self.state.can_undo:
-                self.session.update(self.session.document.undo())
-                self._changed()
+        elif self.state.can_undo:
+            await self.go_to(self.session.document.position - 1)
 
-    def redo(self) -> None:
+    async def redo(self) -> None:
         """Do the edit again that was taken back last."""
-        with self.telling("edit"):
-            if self.state.can_redo:
-                self.session.update(self.session.document.redo())
-                self._changed()
+        if self.state.can_redo:
+            await self.go_to(self.session.document.position + 1)
 
-    def go_to(self, position: int) -> None:
+    async def go_to(self, position: int) -> None:
         """Go to a place in the history."""
         with self.telling("edit"):
-            self.session.update(self.session.document.go_to(int(position)))
-            self._changed()
+            document = self.session.document
+            loop = asyncio.get_running_loop()
+            # A state that a long history has dropped is made again, which may take seconds.
+            there = await loop.run_in_executor(self._pool, document.go_to, int(position))
+            if self.session.current is not None and self.session.here.document is document:
+                self.session.update(there)
+                self._changed()
 
     def name_state(self) -> None:
         """Give the present state the name in the field."""

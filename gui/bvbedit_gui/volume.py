@@ -225,7 +225,7 @@ def axes(chart: Chart) -> tuple[Axis, Axis, Axis]:
         lines = np.moveaxis(angles[..., axis], axis, 0).reshape(len(ticks), -1)
         if np.ptp(lines, axis=1).max() > 1e-9:
             labels = [f"{100 * t:.0f} %" for t in ticks]
-            out.append(Axis(f"{symbol} (% of limit)", tuple(ticks), tuple(labels)))
+            out.append(Axis(f"{symbol}, % of limit", tuple(ticks), tuple(labels)))
         else:
             out.append(Axis(symbol, tuple(ticks), tuple(f"{a:.3g}°" for a in lines[:, 0])))
     return out[0], out[1], out[2]

@@ -126,7 +126,7 @@ class VolumeScene:
         import pyvista as pv
 
         _give(self._selected, pv.PolyData(points) if len(points) else None)
-        self._selected.prop.point_size = max(3.0, 1.2 * self._largest_point(8 * max(len(points), 1)))
+        self._selected.prop.point_size = max(3.0, 0.9 * self._largest_point(8 * max(len(points), 1)))
         _give(self._marked, None if marked is None else pv.PolyData(marked[None]))
 
     def show_knots(self, planes: "list[PolyData] | None") -> None:
@@ -158,7 +158,8 @@ class VolumeScene:
 
     def _label(self) -> None:
         if self._chart is not None:
-            add_box(self.plotter, volume.axes(self._chart), self._theme.ink, self.text_size)
+            hidden = int(self._view) if self._view.isdigit() else None
+            add_box(self.plotter, volume.axes(self._chart), self._theme.ink, self.text_size, hidden)
 
     def nearest_point(self, points: Floats, x: float, y: float, within: float) -> int | None:
         """Return which of ``points`` (n, 3) stands nearest to a place on the picture, in pixels from the lower left."""

@@ -126,7 +126,7 @@ def number_row(
     ``first`` ... ``last``, in ratios if so; the field takes anything that ``low`` and ``high`` allow.
     """
     shown_low, shown_high = (first if low is None else low), (last if high is None else high)
-    limits = f"{shown_low:.6g} ... {shown_high:.6g}" + (f" {unit}" if unit else "")
+    limits = f"{_limit(shown_low)} ... {_limit(shown_high)}" + (f" {unit}" if unit else "")
     with html.Div(classes="d-flex align-center knob", **marks(data_test=f"row {test}")):
         with html.Label(label, classes="text-caption knob-label"):
             hint(f"{help} Limits: {limits}." if help else f"Limits: {limits}.")
@@ -167,6 +167,13 @@ def number_row(
             **marks(aria_label=f"{label}, {limits}", data_test=f"field {test}"),
             classes="knob-field",
         )
+
+
+def _limit(value: float) -> str:
+    """Return a limit in words."""
+    if abs(value) >= 1e100:
+        return "any"
+    return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.6g}"
 
 
 def variable(name: str) -> Callable[[str], str]:
@@ -254,7 +261,7 @@ def panel(name: str, title: str, head: Callable[[], None]) -> Iterator[None]:
                 **marks(aria_label=f"{title}: all the room, or a part of it", data_test=f"maximise {name}"),
                 click=f"maximised = maximised === '{name}' ? '' : '{name}'",
             ):
-                v3.VIcon((f"maximised === '{name}' ? 'mdi-arrow-collapse' : 'mdi-arrow-expand'",))
+                v3.VIcon(icon=(f"maximised === '{name}' ? 'mdi-arrow-collapse' : 'mdi-arrow-expand'",))
         yield
         message(name)
 

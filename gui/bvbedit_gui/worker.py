@@ -5,11 +5,13 @@ A fit holds the interpreter's lock for seconds, and NLopt cannot be interrupted;
 
 import asyncio
 import os
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
+from types import ModuleType
 from typing import Any
 
 from bvbedit.errors import BvbError
@@ -38,9 +40,10 @@ class Worker:
         if self._process is not None and self._process.is_alive():
             return
         self._pipe, other = get_context("spawn").Pipe()
-        self._process = get_context("spawn").Process(target=_serve, args=(other,), daemon=True)
-        with _one_thread():
-            self._process.start()
+        process = get_context("spawn").Process(target=_serve, args=(other,), daemon=True)
+        with _apart():
+            process.start()
+        self._process = process
         other.close()
 
     async def run(self, task: Task, *args: Any, progress: Callable[[float], object] | None = None) -> Any:
@@ -87,20 +90,23 @@ class Worker:
 
 
 @contextmanager
-def _one_thread() -> Iterator[None]:
-    """Let processes that are started meanwhile multiply matrices by one thread, as the commands do.
+def _apart() -> Iterator[None]:
+    """Let a process that is started meanwhile not run the program's main module again, and multiply by one thread.
 
-    By several the last bits are others, and a recipe would not make the same fit again.
+    Tasks need nothing of the main module, and a script that opens a viewer would open another. By several threads the
+    last bits of matrix products are others, and a recipe would not make the same fit again.
     """
-    before = os.environ.get("OPENBLAS_NUM_THREADS")
+    main, threads = sys.modules["__main__"], os.environ.get("OPENBLAS_NUM_THREADS")
+    sys.modules["__main__"] = ModuleType("__main__")
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
     try:
         yield
     finally:
-        if before is None:
+        sys.modules["__main__"] = main
+        if threads is None:
             del os.environ["OPENBLAS_NUM_THREADS"]
         else:
-            os.environ["OPENBLAS_NUM_THREADS"] = before
+            os.environ["OPENBLAS_NUM_THREADS"] = threads
 
 
 def _serve(pipe: Connection) -> None:
