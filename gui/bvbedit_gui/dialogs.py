@@ -58,9 +58,9 @@ def dialogs(viewer: "Viewer") -> None:
         _choices(viewer)
         message("open")
     with _dialog("save", "Save as"):
-        with v3.VCardText():
+        with v3.VCardText(classes="pt-3"):
             v3.VTextField(
-                label="file, in {{ folder }}",
+                label=("'file, in ' + folder",),
                 v_model=("save_name",),
                 update_modelValue="save_name = $event; save_confirm = ''",
                 keydown_enter=(viewer.save_as, "[]"),
@@ -101,7 +101,7 @@ def dialogs(viewer: "Viewer") -> None:
     with _dialog("recipe", "Recipe", 680):
         with v3.VCardText():
             html.P(
-                "What was done, for bvbedit run: save it beside the model as a .toml file.", classes="text-caption mb-2"
+                "What was done, for bvbedit run: save it as a .toml file in {{ folder }}.", classes="text-caption mb-2"
             )
             html.Pre("{{ recipe }}", classes="recipe", **marks(data_test="recipe text"))
             message("save")

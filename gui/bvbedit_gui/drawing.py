@@ -16,7 +16,7 @@ Point = tuple[float, float, float]
 
 def number(value: float) -> str:
     """Return ``value`` with three digits, for people."""
-    return f"{float(f'{value:.3g}'):,.0f}" if 1000 <= value < 1e6 else f"{value:.3g}"
+    return f"{float(f'{value:.3g}'):,.0f}" if 1000 <= abs(value) < 1e6 else f"{value:.3g}"
 
 
 def font(bold: bool = False) -> str:

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 POINT_REACH, AXIS_REACH = 14, 12
 # Control points that belong less to a region than this are not marked.
 BELONGS = 0.02
+# The largest share of the control points that are marked.
+MOST = 0.6
 STARTS: dict[str, Any] = {"picked": "", "probe": [0.3, 0.5, 0.5]}
 
 
@@ -121,7 +123,10 @@ class Picking:
             region = region_of(self.state)
             if region and is_regional(self.state.op):
                 named: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in region.items()}
-                chosen = points[Region(**named).weights(model.chart, points) > BELONGS]
+                reached = Region(**named).weights(model.chart, points) > BELONGS
+                # Where nearly all are, marking them would hide the rest of the picture and tell nothing.
+                if reached.mean() <= MOST:
+                    chosen = points[reached]
         except (BvbError, TypeError, ValueError):
             pass  # told beside the knobs
         scene.show_selected(chosen, marked)

@@ -10,6 +10,7 @@ from bvbedit.brdf.spline_brdf import SplineBrdf
 from bvbedit.edit.autosave import autosave, autosave_path, discard_autosave, recovered
 from bvbedit.edit.document import Document
 from bvbedit.edit.operation import Edit
+from bvbedit.edit.paths import relative_to
 from bvbedit.edit.recipe import Source, to_toml
 from bvbedit.errors import BvbError
 from bvbedit.io import load
@@ -153,7 +154,7 @@ class Session:
         """Return how the model came about, as a recipe. Raises BvbError where there is no model."""
         here = self.here
         output = here.path.name if here.path is not None else f"{Path(here.name).stem}-edited.bvb"
-        return to_toml(here.known_document.recipe(), [output])
+        return to_toml(relative_to(self.places.folder, here.known_document.recipe()), [output])
 
     def keep(self) -> None:
         """Keep what is unsaved beside its file, for the case of a crash."""

@@ -130,7 +130,25 @@ def _region(viewer: "Viewer") -> None:
                 **marks(aria_label=f"{symbol} from, to", data_test=f"region_{name}"),
                 classes="mx-1",
             )
-            html.Span(f"{{{{ region_{name}[0] }}}}–{{{{ region_{name}[1] }}}}°", classes="text-caption region-text")
+            for end, other in ((0, 1), (1, 0)):
+                given = "Number($event.target.value)"
+                pair = [given, given]
+                pair[other] = f"region_{name}[{other}]"
+                html.Input(
+                    type="number",
+                    value=(f"region_{name}[{end}]",),
+                    change=f"region_{name} = [{', '.join(pair)}]",
+                    disabled=(f"!region_{name}_on",),
+                    classes="region-field",
+                    **marks(
+                        aria_label=f"{symbol} {('from', 'to')[end]}, 0 ... {top} degrees",
+                        data_test=f"region_{name} {end}",
+                        min="0",
+                        max=str(top),
+                        step="any",
+                    ),
+                )
+            html.Span("°", classes="text-caption")
     number_row(
         "falloff",
         "region_falloff",

@@ -6,14 +6,15 @@ html { overflow: hidden !important; }
 .fill, .fill .v-application__wrap { height: 100vh; min-height: 0 !important; }
 .desk { display: flex; height: calc(100vh - 45px); }
 .panels { flex: 1; min-width: 0; display: grid; gap: 1px; background: rgba(128, 128, 128, .35);
-  grid-template-columns: minmax(0, 54fr) minmax(0, 46fr); grid-template-rows: minmax(0, 55fr) minmax(0, 45fr); }
+  grid-template-columns: round(54%, 1px) minmax(0, 1fr); grid-template-rows: round(55%, 1px) minmax(0, 1fr); }
 .panel { background: rgb(var(--v-theme-surface)); display: flex; flex-direction: column; min-width: 0; min-height: 0;
   overflow: hidden; }
 .panel-max { grid-column: 1 / 3; grid-row: 1 / 3; }
 .panel-head { display: flex; align-items: center; height: 32px; padding: 0 4px 0 8px; flex: none; }
+/* Pictures are as large as their areas in whole pixels: scaled by a fraction of one, text would blur. */
 .picture { flex: 1; min-height: 0; position: relative; overflow: hidden; }
 .controls { flex: none; }
-.note { opacity: .8; line-height: 1.2; flex: none; overflow-wrap: anywhere; }
+.note { opacity: .8; line-height: 16px !important; flex: none; overflow-wrap: anywhere; }
 .side { width: 320px; flex: none; display: flex; flex-direction: column; border-left: 1px solid rgba(128,128,128,.35);
   background: rgb(var(--v-theme-surface)); }
 .side-room { flex: 1; overflow-y: auto; min-height: 0; }
@@ -28,11 +29,14 @@ html { overflow: hidden !important; }
 .knob-field .v-field { --v-input-control-height: 26px; }
 .knob-field input::-webkit-outer-spin-button, .knob-field input::-webkit-inner-spin-button { -webkit-appearance: none; }
 .region-label { width: 26px; flex: none; }
-.region-text { width: 76px; flex: none; text-align: right; white-space: nowrap; }
+.region-field { width: 40px; flex: none; margin-left: 3px; padding: 1px 3px; font-size: 12px; text-align: right;
+  border: 1px solid rgba(128, 128, 128, .6); border-radius: 3px; color: inherit; }
+.region-field:disabled { opacity: .5; }
+.region-field::-webkit-outer-spin-button, .region-field::-webkit-inner-spin-button { -webkit-appearance: none; }
 .region { border-top: 1px solid rgba(128, 128, 128, .35); padding-top: 6px; }
 .iso-text { width: 150px; flex: none; text-align: right; white-space: nowrap; overflow: hidden;
   text-overflow: ellipsis; }
-.bar { flex: none; padding: 0 14px 17px 8px; display: flex; align-items: center; }
+.bar { flex: none; height: 34px; padding: 0 14px 17px 8px; display: flex; align-items: center; }
 .bar-title { white-space: nowrap; margin-right: 12px; }
 .bar-colours { flex: 1; height: 10px; position: relative; border: 1px solid rgba(128, 128, 128, .5); }
 .bar-tick { position: absolute; top: 9px; transform: translateX(-50%); white-space: nowrap; line-height: 1.4; }

@@ -145,7 +145,7 @@ class Viewer:
         """Show what is open already. Needs a running event loop."""
         self.list_files()
         with self.state:
-            self._changed()
+            self._arrived()
 
     # What is shown
 
@@ -305,18 +305,24 @@ class Viewer:
 
     def _opened(self, opened: Opened) -> None:
         self.session.add(opened)
-        self.state.dialog = ""
-        self.state.against = NOTHING
-        if opened.document is None:
-            self.state.tab = "fit"
-            self.state.fit_of = "source"
-        self.volume.forget_view()
-        self._changed()
+        self._arrived()
 
     def _go_to_document(self, key: int) -> None:
         self.session.current = key
-        self.state.dialog = ""
+        self._arrived()
+
+    def _arrived(self) -> None:
+        """Another material is worked on: show it beside its source, and what can be done with it."""
+        state = self.state
+        state.dialog = ""
+        state.against = NOTHING
         self.volume.forget_view()
+        if self.session.current is not None:
+            here = self.session.here
+            if here.document is None:
+                state.update({"tab": "fit", "fit_of": "source"})
+            elif here.reference is not None:
+                state.against = SOURCE
         self._changed()
 
     def _current_changed(self, current: Any, **_: Any) -> None:
@@ -339,9 +345,7 @@ class Viewer:
                 return
             self.session.close(at)
             self.state.closing = None
-            self.state.dialog = ""
-            self.volume.forget_view()
-            self._changed()
+            self._arrived()
 
     # Saving
 
@@ -593,8 +597,8 @@ class Viewer:
             self.session.current = key
         else:
             self.session.add(fitted)
-        self._changed()
-        self.state.against = SOURCE
+        self._arrived()
+        self.state.tab = "fit"
 
     def _fit_progress(self, share: float) -> None:
         with self.state:

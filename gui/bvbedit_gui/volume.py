@@ -3,6 +3,7 @@
 Pure functions from a BRDF to arrays and PyVista meshes in chart parameters [0, 1]^3; no window is opened here.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Literal
@@ -97,13 +98,22 @@ class Field:
         return max(low, FLOOR), max(high, FLOOR)
 
 
-def field(brdf: Brdf, chart: Chart, what: What = "luminance", reference: Brdf | None = None) -> Field:
-    """Return what is shown of ``brdf`` over the parameter box of a chart; a difference to ``reference`` has a sign."""
+def field(
+    brdf: Brdf,
+    chart: Chart,
+    what: What = "luminance",
+    reference: Brdf | None = None,
+    sample: Callable[[Brdf, Chart, tuple[Floats, Floats, Floats]], Floats] = sampled,
+) -> Field:
+    """Return what is shown of ``brdf`` over the parameter box of a chart; a difference to ``reference`` has a sign.
+
+    ``sample`` is how the reference is sampled: a measurement takes 0.3 s, and may be known already.
+    """
     axes = box_nodes(brdf)
     rgb = sampled(brdf, chart, axes)
     if what == "difference":
         assert reference is not None
-        return Field(scalar(rgb - sampled(reference, chart, axes), what), signed=True)
+        return Field(scalar(rgb - sample(reference, chart, axes), what), signed=True)
     return Field(scalar(rgb, what))
 
 

@@ -126,7 +126,7 @@ class VolumeScene:
         import pyvista as pv
 
         _give(self._selected, pv.PolyData(points) if len(points) else None)
-        self._selected.prop.point_size = max(3.0, 0.9 * self._largest_point(8 * max(len(points), 1)))
+        self._selected.prop.point_size = float(np.clip(0.5 * self._largest_point(len(points)), 2.0, 5.0))
         _give(self._marked, None if marked is None else pv.PolyData(marked[None]))
 
     def show_knots(self, planes: "list[PolyData] | None") -> None:

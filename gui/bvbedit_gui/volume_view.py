@@ -1,5 +1,6 @@
 """The volume's panel: what of the field is shown, and the scene that shows it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 TEXT_SIZE = 13
 # Colours run a little beyond the values, so that the outermost surfaces do not take the map's extreme colours.
 MARGIN = 0.3
+# Marks of the colour bar are no closer than this, in per cent of it.
+APART = 10.0
 STARTS: dict[str, Any] = {
     "what": "luminance",
     "what_items": [],
@@ -80,6 +83,7 @@ class VolumeView:
         self.send: Any = lambda: None
         self.field: volume.Field | None = None
         self._unseen = True
+        self._kept: tuple[Brdf, Chart, tuple[int, ...], Floats] | None = None
         on = self.state.change
         on("what")(lambda **_: self.refresh())
         on("iso", "iso_count", "iso_gap", "opacity")(lambda **_: self.show_surfaces())
@@ -111,7 +115,14 @@ class VolumeView:
         )
         slices = [float(state[f"slice_{n}"]) if state[f"slice_{n}_on"] else None for n in range(3)]
         wanted = bool(state.show_net), bool(state.show_knots)
-        self.queue.ask(lambda: _draw(shown, chart, what, other, slices, *wanted), self._show)
+        self.queue.ask(lambda: _draw(shown, chart, what, other, slices, *wanted, self._sampled), self._show)
+
+    def _sampled(self, brdf: Brdf, chart: Chart, axes: tuple[Floats, Floats, Floats]) -> Floats:
+        """Return what ``volume.sampled`` does, and keep it for the next time: what is compared with seldom changes."""
+        sizes = tuple(len(axis) for axis in axes)
+        if self._kept is None or self._kept[:3] != (brdf, chart, sizes):
+            self._kept = brdf, chart, sizes, volume.sampled(brdf, chart, axes)
+        return self._kept[3]
 
     def _show(self, drawn: _Drawn) -> None:
         self.field = drawn.field
@@ -155,11 +166,13 @@ class VolumeView:
         stops = colormaps[DIFFERENCE_MAP if field.signed else COLOUR_MAP](np.linspace(0, 1, 17), bytes=True)
         css = ", ".join(f"rgb({r},{g},{b})" for r, g, b, _ in stops)
         values = volume.iso_values(low, high) or [high]
-        values = values[:: -(-len(values) // 3)] if field.signed else values
-        marks = [-v for v in values[::-1]] + [0.0, *values] if field.signed else values
-        ticks = [
-            {"at": round(100 * (float(field.level(v)) - first) / (last - first), 2), "text": number(v)} for v in marks
-        ]
+        # The largest values come first: they keep their marks where others would be too close.
+        marks = [0.0, *(sign * v for v in values[::-1] for sign in (1, -1))] if field.signed else values[::-1]
+        ticks: list[dict[str, Any]] = []
+        for value in marks:
+            at = round(100 * (float(field.level(value)) - first) / (last - first), 2)
+            if all(abs(at - tick["at"]) >= APART for tick in ticks):
+                ticks.append({"at": at, "text": number(value)})
         state = self.state
         state.bar_css = f"linear-gradient(to right, {css})"
         state.bar_ticks = ticks
@@ -218,8 +231,11 @@ def _draw(
     slices: list[float | None],
     with_net: bool,
     with_knots: bool,
+    sample: Callable[[Brdf, Chart, tuple[Floats, Floats, Floats]], Floats],
 ) -> _Drawn:
-    field = volume.field(shown, chart, what, other)
+    field = volume.field(shown, chart, what, other, sample)
+    # Here, in a thread, and not when the page waits for surfaces.
+    _ = field.ends, field.grid
     net, knots = None, None
     if isinstance(shown, SplineBrdf):
         if with_net:
