@@ -11,6 +11,7 @@ import secrets
 import socket
 import sys
 from collections.abc import Callable, Sequence
+from http.cookies import Morsel
 from pathlib import Path
 from typing import Any
 
@@ -110,7 +111,11 @@ class Page:
 
     async def _leave_cookie(self, request: Any, response: Any) -> None:
         if _equal(request.query.get("secret", ""), self.key):
-            response.set_cookie(self._cookie, self.key, httponly=True, samesite="Strict", path="/")
+            # The response's own cookies are written before this is called.
+            cookie: Morsel[str] = Morsel()
+            cookie.set(self._cookie, self.key, self.key)
+            cookie.update({"httponly": True, "samesite": "Strict", "path": "/"})
+            response.headers.add("Set-Cookie", cookie.OutputString())
         response.headers["Referrer-Policy"] = "no-referrer"
         response.headers["X-Content-Type-Options"] = "nosniff"
         if request.path.endswith((".html", "/")):
