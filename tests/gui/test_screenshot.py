@@ -12,19 +12,7 @@ from bvbedit import BvbError
 from bvbedit.brdf.analytic import GGX, Lambert, Schlick
 from bvbedit.io.png import read_png
 from bvbedit_gui import opengl, screenshot
-
-
-def drawing_works() -> str:
-    """Return why nothing can be drawn here, or nothing."""
-    try:
-        opengl.require_opengl()
-    except BvbError as error:
-        return str(error)
-    return ""
-
-
-needs_opengl = pytest.mark.skipif(bool(drawing_works()), reason=drawing_works())
-
+from tests.gui.opengl import needs_opengl
 
 # Which chart and encoding serve best is not what pictures are tested for.
 SHARP = {"chart": "half-diff", "encoding": "root"}

@@ -1,7 +1,9 @@
 """A viewer without its page, for tests: what the page's variables and methods do."""
 
 import asyncio
-from collections.abc import Callable, Coroutine
+import gc
+import logging
+from collections.abc import Callable, Coroutine, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -19,6 +21,8 @@ def with_viewer(
     async def main() -> None:
         from trame.app import get_server
 
+        asyncio.get_running_loop().set_exception_handler(escaped.of_loop)
+
         from bvbedit_gui.viewer import Viewer
 
         session = Session(Places.of(folder))
@@ -33,7 +37,45 @@ def with_viewer(
         finally:
             viewer.end()
 
-    asyncio.run(main())
+    with escaping() as escaped:
+        asyncio.run(main())
+
+
+class Escaped(logging.Handler):
+    """Collects the exceptions that trame and the event loop write to the log and otherwise forget."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.WARNING)
+        self.errors: list[BaseException] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Keep an exception that is logged; trame's state gives it as an argument."""
+        given = record.args if isinstance(record.args, tuple) else ()
+        if record.exc_info and record.exc_info[1] is not None:
+            self.errors.append(record.exc_info[1])
+        self.errors += [value for value in given if isinstance(value, BaseException)]
+
+    def of_loop(self, _: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+        """Keep an exception of a task that nobody waits for, or of a callback."""
+        self.errors.append(context.get("exception") or RuntimeError(context["message"]))
+
+    def check(self) -> None:
+        """Raise the first exception that was kept."""
+        if self.errors:
+            raise AssertionError(f"exceptions that escaped: {len(self.errors)}") from self.errors[0]
+
+
+@contextmanager
+def escaping() -> Iterator[Escaped]:
+    """Collect what callbacks of the state and tasks raise inside, and raise the first of it at the end."""
+    escaped = Escaped()
+    logging.getLogger().addHandler(escaped)
+    try:
+        yield escaped
+        gc.collect()  # tasks tell of their exceptions when they are freed
+    finally:
+        logging.getLogger().removeHandler(escaped)
+    escaped.check()
 
 
 async def let(viewer: Any, **variables: Any) -> None:
