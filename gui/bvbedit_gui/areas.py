@@ -10,14 +10,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bvbedit_gui.given import real, whole
+
 if TYPE_CHECKING:
     from pyvista import Plotter
 
 Pixels = NDArray[np.uint8]
+# Pixels that an area may have along a side.
+SMALLEST, LARGEST = 16, 8192
 # A press and a release within so many pixels are a click; beyond that something was dragged.
 CLICK = 4
 # Samples of a pixel in pictures that have come to rest; while something moves, they would take half as long again.
 SAMPLES = 8
+
+
+def _size(width: Any, height: Any) -> tuple[int, int]:
+    return whole(width, SMALLEST, SMALLEST, LARGEST), whole(height, SMALLEST, SMALLEST, LARGEST)
 
 
 class SceneArea:
@@ -59,21 +67,23 @@ class SceneArea:
     def process_resize_event(self, width: int, height: int) -> None:
         """Take another size, in pixels."""
         self.moved()
-        if tuple(self._plotter.window_size) != (width, height):
-            self._window.process_resize_event(width, height)
+        size = _size(width, height)
+        if tuple(self._plotter.window_size) != size:
+            self._window.process_resize_event(*size)
             self._resized()
 
     def process_interaction_event(self, event: dict[str, Any]) -> None:
         """Turn the scene, or report a click with its place and whether the shift key was down."""
         self.moved()
         kind = event.get("type")
+        here = real(event.get("x"), -1.0), real(event.get("y"), -1.0)
         if kind == "LeftButtonPress":
-            self._pressed = event["x"], event["y"]
+            self._pressed = here
         self._window.process_interaction_event(event)
         if kind == "LeftButtonRelease" and self._pressed is not None:
             x, y = self._pressed
             self._pressed = None
-            if np.hypot(event["x"] - x, event["y"] - y) <= CLICK:
+            if np.hypot(here[0] - x, here[1] - y) <= CLICK:
                 self._clicked(x, y, bool(event.get("shiftKey")))
 
 
@@ -113,9 +123,10 @@ class PictureArea:
 
     def process_resize_event(self, width: int, height: int) -> None:
         """Take another size, in pixels."""
-        if (width, height) != self.size:
-            self.size = (width, height)
-            self._resized(width, height)
+        size = _size(width, height)
+        if size != self.size:
+            self.size = size
+            self._resized(*size)
 
     def process_interaction_event(self, event: dict[str, Any]) -> None:
         """Nothing can be done with a picture."""

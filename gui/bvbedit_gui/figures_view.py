@@ -2,11 +2,10 @@
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from bvbedit.brdf.base import Brdf
 from bvbedit.brdf.charts import Chart
 from bvbedit.brdf.spline_brdf import SplineBrdf
+from bvbedit_gui.given import one_of, real, whole
 from bvbedit_gui.plots.albedo_picture import draw_albedo
 from bvbedit_gui.plots.albedos import albedo_curve
 from bvbedit_gui.plots.facts import figures
@@ -49,7 +48,7 @@ class FiguresView:
         if shown is None:
             return
         state = self.state
-        figure, theme = state.figure, THEMES.get(state.theme, THEMES["light"])
+        figure, theme = state.figure, THEMES[one_of(state.theme, THEMES, "light")]
         width, height = self._size()
         if figure == "line":
             axis, at = self._line()
@@ -71,20 +70,14 @@ class FiguresView:
     def _line(self) -> tuple[int, tuple[float, float, float]]:
         """Return the axis and the place of the line; a page may have sent anything."""
         state = self.state
-        try:
-            axis = int(np.clip(int(state.line_axis), 0, 2))
-            u, v, w = (float(np.clip(float(p), 0.0, 1.0)) for p in state.probe)
-        except (TypeError, ValueError):
-            return 0, (0.5, 0.5, 0.5)
-        return axis, (u, v, w)
+        probe = state.probe if isinstance(state.probe, list) and len(state.probe) == 3 else [0.5] * 3
+        u, v, w = (real(p, 0.5, 0.0, 1.0) for p in probe)
+        return whole(state.line_axis, 0, 0, 2), (u, v, w)
 
     def _size(self) -> tuple[int, int]:
-        try:
-            given = round(float(self.state.figure_size["width"])), round(float(self.state.figure_size["height"]))
-        except (TypeError, ValueError, KeyError):
-            return SMALLEST
-        width, height = (int(np.clip(g, s, m)) for g, s, m in zip(given, SMALLEST, LARGEST, strict=True))
-        return width, height
+        given = self.state.figure_size if isinstance(self.state.figure_size, dict) else {}
+        (low, lower), (high, higher) = SMALLEST, LARGEST
+        return whole(given.get("width"), low, low, high), whole(given.get("height"), lower, lower, higher)
 
     def _show(self, name: str, value: Any) -> None:
         with self.state:

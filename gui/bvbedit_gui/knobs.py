@@ -11,6 +11,7 @@ from typing import Any, Literal, get_args, get_origin, get_type_hints
 from bvbedit.edit.operation import Edit
 from bvbedit.edit.operations import OPERATIONS, edit_of
 from bvbedit.edit.region import HALF_ANGLES, PLAIN_ANGLES, Region
+from bvbedit.errors import BvbError
 
 Kind = Literal["number", "numbers", "choice", "switch", "file", "axis"]
 ANGLES = (*HALF_ANGLES, *PLAIN_ANGLES)
@@ -181,8 +182,14 @@ def region_starts() -> dict[str, Any]:
 
 
 def region_of(state: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the region that the page's variables stand for, as edits have it; empty for all directions."""
-    out: dict[str, Any] = {name: list(state[f"region_{name}"]) for name in ANGLES if state[f"region_{name}_on"]}
+    """Return the region that the page's variables stand for, as edits have it; empty for all directions.
+
+    Raises BvbError where an interval is none.
+    """
+    out: dict[str, Any] = {name: state[f"region_{name}"] for name in ANGLES if state[f"region_{name}_on"]}
+    for name, given in out.items():
+        if not isinstance(given, list):
+            raise BvbError(f"{name} is {given}. Give two angles, the smaller one first.")
     return {**out, "falloff": state["region_falloff"]} if out else {}
 
 
@@ -212,7 +219,7 @@ def _number(value: Any, whole: bool) -> Any:
     if isinstance(value, str | int | float) and not isinstance(value, bool):
         try:
             number = float(value)
-        except ValueError:
+        except (ValueError, OverflowError):
             return value
         return int(number) if whole and number.is_integer() else number
     return value

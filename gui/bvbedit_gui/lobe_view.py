@@ -9,7 +9,8 @@ from bvbedit.brdf.encodings import Encoding, Linear, Log, Root
 from bvbedit_gui import lobes
 from bvbedit_gui.areas import SceneArea
 from bvbedit_gui.drawing import number
-from bvbedit_gui.lobe_scene import VIEWS, LobeScene
+from bvbedit_gui.given import one_of, real
+from bvbedit_gui.lobe_scene import VIEWS, Beside, LobeScene
 
 if TYPE_CHECKING:
     from bvbedit_gui.viewer import Viewer
@@ -18,6 +19,7 @@ TEXT_SIZE = 13
 # At 90 degrees itself no reflectance exists.
 HIGHEST = 89.0
 SCALES: dict[str, Encoding] = {"linear": Linear(), "root": Root(), "log": Log()}
+BESIDE: tuple[Beside, ...] = ("none", "wire", "beside")
 STARTS: dict[str, Any] = {"theta_i": 45.0, "lobe_scale": "auto", "lobe_beside": "wire", "lobe_note": ""}
 
 
@@ -43,8 +45,8 @@ class LobeView:
         shown, other = self._viewer.shown, self._viewer.other
         if shown is None:
             return
-        theta_i = float(np.radians(np.clip(_real(self.state.theta_i, 45.0), 0.0, HIGHEST)))
-        beside = self.state.lobe_beside if other is not None else "none"
+        theta_i = float(np.radians(real(self.state.theta_i, 45.0, 0.0, HIGHEST)))
+        beside: Beside = one_of(self.state.lobe_beside, BESIDE, "wire") if other is not None else "none"
         wanted = other if beside != "none" else None
         self.queue.ask(
             lambda: (_lobe(shown, theta_i), None if wanted is None else _lobe(wanted, theta_i)),
@@ -55,8 +57,7 @@ class LobeView:
         peaks = [float(np.max(m.point_data[lobes.LENGTH])) for m in (mesh, other) if m is not None]
         # A black material has no length to scale by.
         peak = max(peaks) or 1.0
-        chosen = self.state.lobe_scale
-        scale = SCALES[chosen] if chosen in SCALES else lobes.fitting_scale(mesh)
+        scale = SCALES.get(one_of(self.state.lobe_scale, SCALES, "auto")) or lobes.fitting_scale(mesh)
         self.scene.show(mesh, scale, peak, theta_i, other=other, beside=beside)
         with self.state:
             told = f"peak {number(peaks[0])}/sr, {WORDS[scale.name]} radius"
@@ -67,9 +68,8 @@ class LobeView:
 
     def look_from(self, view: str) -> None:
         """Look at the lobes from a side."""
-        if view in VIEWS:
-            self.scene.look_from(view)
-            self.draw()
+        self.scene.look_from(one_of(view, VIEWS, "oblique"))
+        self.draw()
 
     def draw(self) -> None:
         """Send a picture of the scene as it is now."""
@@ -86,11 +86,3 @@ WORDS = {"linear": "linear", "root": "cube-root", "log": "logarithmic"}
 
 def _lobe(brdf: Brdf, theta_i: float) -> Any:
     return lobes.lobe(brdf, theta_i, lobes.COARSER)
-
-
-def _real(value: Any, otherwise: float) -> float:
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        return otherwise
-    return number if np.isfinite(number) else otherwise

@@ -83,7 +83,7 @@ class Picking:
         phi = float(np.degrees(np.arctan2(abs(cross), float(wi[0, :2] @ wo[0, :2]))))
         f = model.evaluate(wi, wo)[0]
         self.state.probe = [round(float(p), 4) for p in place]
-        if self.state.op != "move_points" or not self.state.edit_pending:
+        if self._viewer.op != "move_points" or not self.state.edit_pending:
             self.state.knob_move_points_at = [round(theta_i, 2), round(theta_o, 2), round(phi, 2)]
             self.state.knob_move_points_rgb = [float(f"{v:.4g}") for v in f]
 
@@ -121,13 +121,13 @@ class Picking:
         chosen = np.zeros((0, 3))
         try:
             region = region_of(self.state)
-            if region and is_regional(self.state.op):
+            if region and is_regional(viewer.op):
                 named: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in region.items()}
                 reached = Region(**named).weights(model.chart, points) > BELONGS
                 # Where nearly all are, marking them would hide the rest of the picture and tell nothing.
                 if reached.mean() <= MOST:
                     chosen = points[reached]
-        except (BvbError, TypeError, ValueError):
+        except (BvbError, TypeError):
             pass  # told beside the knobs
         scene.show_selected(chosen, marked)
         viewer.volume.draw()

@@ -33,7 +33,7 @@ class Places:
 
         Raises BvbError for nothing, another suffix, and what lies elsewhere, links followed.
         """
-        if not text.strip():
+        if not isinstance(text, str) or not text.strip():
             raise BvbError("No file is named. Give a name.")
         try:
             path = (self.folder / text.strip()).resolve()

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from bvbedit_gui import places as files
 from bvbedit_gui.areas import PictureArea
+from bvbedit_gui.given import one_of, real
 from bvbedit_gui.preview import GAP, Layout, Preview, Seen, Wish, composed
 from bvbedit_gui.themes import Theme
 
@@ -42,12 +43,17 @@ class PreviewView:
         """Whether the newest wish has no picture yet."""
         return self._wish is not self._shown
 
+    @property
+    def layout(self) -> Layout:
+        """The layout that is asked for."""
+        return one_of(self.state.layout, LAYOUTS, "alone")
+
     def refresh(self) -> None:
         """Make the picture anew."""
         shown = self._viewer.shown
         if shown is None:
             return
-        other = None if self.state.layout == "alone" else self._viewer.other
+        other = None if self.layout == "alone" else self._viewer.other
         try:
             self._loop = asyncio.get_running_loop()
         except RuntimeError:
@@ -58,7 +64,7 @@ class PreviewView:
                 scene = self._viewer.session.places.path(str(scene), files.SCENES)
             if self.state.error_preview:
                 return
-        wish = Wish(shown, other, scene, self._side(1 if other is None else 2 if self.state.layout == "beside" else 3))
+        wish = Wish(shown, other, scene, self._side(1 if other is None else 2 if self.layout == "beside" else 3))
         self._wish = wish
         self._preview.ask(wish)
 
@@ -95,12 +101,8 @@ class PreviewView:
         seen = self.seen
         if seen is None:
             return
-        try:
-            exposure = min(max(float(self.state.exposure), -10.0), 10.0)
-        except (TypeError, ValueError):
-            exposure = 0.0
-        layout: Layout = self.state.layout if self.state.layout in LAYOUTS else "alone"
-        picture, found, gain = composed(seen, layout, exposure)
+        exposure = real(self.state.exposure, 0.0, -10.0, 10.0)
+        picture, found, gain = composed(seen, self.layout, exposure)
         told = f"{seen.samples} samples a pixel"
         if found is not None:
             told += f", MAE {255 * found.mae:.2f}, PAE {255 * found.pae:.0f} of 255"

@@ -5,6 +5,7 @@ result is wanted, or in the worker's process; both hand their results back to th
 """
 
 import asyncio
+import logging
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
@@ -23,6 +24,7 @@ from bvbedit.errors import BvbError
 from bvbedit_gui import places as files
 from bvbedit_gui import tasks
 from bvbedit_gui.figures_view import FiguresView
+from bvbedit_gui.given import one_of
 from bvbedit_gui.knobs import edit_from, knobs_of, region_starts, starts
 from bvbedit_gui.latest import Latest
 from bvbedit_gui.lobe_view import LobeView
@@ -78,7 +80,6 @@ class Viewer:
         self._pending = self.latest("edit")
         self._saving: asyncio.TimerHandle | None = None
         self._keep = Latest(ThreadPoolExecutor(1, thread_name_prefix="keep"), lambda e: self.tell("save", e))
-        self._touched = 0
         self._start_state()
         theme = THEMES[self.state.theme]
         self.volume = VolumeView(self, theme)
@@ -157,6 +158,11 @@ class Viewer:
         return None if self.session.current is None else self.session.here.shown
 
     @property
+    def document(self) -> Document | None:
+        """What is worked on, if that is a model."""
+        return None if self.session.current is None else self.session.here.document
+
+    @property
     def other(self) -> Brdf | None:
         """What it is compared with, if with anything."""
         if self.session.current is None:
@@ -166,9 +172,7 @@ class Viewer:
             return here.reference
         if against == BEFORE:
             return None if here.document is None else here.document.at(0)
-        if against.startswith("document ") and int(against.split()[1]) in self.session:
-            return self.session[int(against.split()[1])].shown
-        return None
+        return next((o.shown for key, o in self.session if against == f"document {key}"), None)
 
     @property
     def chart(self) -> Chart:
@@ -198,7 +202,7 @@ class Viewer:
         self.state[f"error_{place}"] = ""
         try:
             yield
-        except (BvbError, MemoryError, OSError) as error:
+        except Exception as error:  # what is not told looks as if the button did nothing
             self.state[f"error_{place}"] = words(error)
 
     def _synchronise(self) -> None:
@@ -208,8 +212,7 @@ class Viewer:
             {"key": key, "name": o.name, "unsaved": o.unsaved, "model": o.document is not None} for key, o in session
         ]
         state.current = session.current
-        here = None if session.current is None else session.here
-        document = None if here is None else here.document
+        here, document = None if session.current is None else session.here, self.document
         state.is_model = document is not None
         state.unsaved = any(o.unsaved for _, o in session)
         state.can_undo = document is not None and document.position > 0
@@ -326,16 +329,21 @@ class Viewer:
         self._changed()
 
     def _current_changed(self, current: Any, **_: Any) -> None:
-        if current != self.session.current and current in self.session:
-            self._go_to_document(int(current))
+        key = self._known(current)
+        if key is not None and key != self.session.current:
+            self._go_to_document(key)
         elif current != self.session.current:
             self.state.current = self.session.current
+
+    def _known(self, key: Any) -> int | None:
+        """Return the key of an open document, or None for anything else that a page has sent."""
+        return one_of(key, [known for known, _ in self.session], None)
 
     def close(self, key: int | None = None, *, discard: bool = False) -> None:
         """Close a document; what is unsaved is asked about first, unless it may be discarded."""
         with self.telling("open"):
-            at = self.session.current if key is None else key
-            if at is None or at not in self.session:
+            at = self.session.current if key is None else self._known(key)
+            if at is None:
                 return
             if self.session[at].unsaved and self.session[at].document is not None and not discard:
                 self.session.current = at
@@ -400,6 +408,11 @@ class Viewer:
 
     # Editing
 
+    @property
+    def op(self) -> str:
+        """The edit that is chosen in the panel."""
+        return one_of(self.state.op, OFFERED, OFFERED[0])
+
     def _op_changed(self, **_: Any) -> None:
         self.state.error_edit = ""
         self._drop_pending(redraw=True)
@@ -411,12 +424,13 @@ class Viewer:
         self._try_edit()
 
     def _is_touched(self) -> bool:
-        return any(_differs(self.state[knob.state], knob.start) for knob in knobs_of(self.state.op))
+        return any(_differs(self.state[knob.state], knob.start) for knob in knobs_of(self.op))
 
     def _try_edit(self) -> None:
         """Show what the edit in the panel would make of the model, without doing it."""
         state = self.state
-        if not state.is_model:
+        base = self.document
+        if base is None:
             return
         if not self._is_touched() or not state.live:
             self._drop_pending(redraw=True)
@@ -428,14 +442,12 @@ class Viewer:
             self._drop_pending(redraw=True)
             return
         state.error_edit = ""
-        base = self.session.document
-        self._touched += 1
         self._pending.ask(lambda: edit.apply(base.model), lambda model: self._show_pending(base, edit, model))
 
     def _edit(self) -> Edit:
-        if self.state.op == "blend" and not self.state.knob_blend_partner:
+        if self.op == "blend" and not self.state.knob_blend_partner:
             raise BvbError("Choose the other material first.")
-        edit = edit_from(self.state.op, self.state)
+        edit = edit_from(self.op, self.state)
         partner = getattr(edit, "partner", None)
         if partner is not None:
             edit = replace(edit, partner=self.session.places.path(str(partner), files.MODELS))  # type: ignore[call-arg]
@@ -482,7 +494,7 @@ class Viewer:
 
     def cancel_edit(self) -> None:
         """Put the knobs of the panel back, and show the model as it is."""
-        self._reset_knobs(self.state.op)
+        self._reset_knobs(self.op)
         self._drop_pending(redraw=True)
         self.state.error_edit = ""
 
@@ -508,21 +520,21 @@ class Viewer:
         """Take the last edit back; an edit that is being tried is taken back first."""
         if self.pending is not None:
             self.cancel_edit()
-        elif self.state.can_undo:
-            await self.go_to(self.session.document.position - 1)
+        elif self.document is not None and self.document.position > 0:
+            await self.go_to(self.document.position - 1)
 
     async def redo(self) -> None:
         """Do the edit again that was taken back last."""
-        if self.state.can_redo:
-            await self.go_to(self.session.document.position + 1)
+        if self.document is not None and self.document.position < len(self.document.edits):
+            await self.go_to(self.document.position + 1)
 
     async def go_to(self, position: int) -> None:
         """Go to a place in the history."""
         with self.telling("edit"):
             document = self.session.document
-            loop = asyncio.get_running_loop()
+            steps, loop = range(len(document.edits) + 1), asyncio.get_running_loop()
             # A state that a long history has dropped is made again, which may take seconds.
-            there = await loop.run_in_executor(self._pool, document.go_to, int(position))
+            there = await loop.run_in_executor(self._pool, document.go_to, one_of(position, steps, -1))
             if self.session.current is not None and self.session.here.document is document:
                 self.session.update(there)
                 self._changed()
@@ -610,11 +622,11 @@ class Viewer:
 
     # Looks
 
-    def _theme_changed(self, theme: str, **_: Any) -> None:
-        if theme in THEMES:
-            self.volume.recolour(THEMES[theme])
-            self.preview.recolour(THEMES[theme])
-            self.figures.refresh()
+    def _theme_changed(self, **_: Any) -> None:
+        theme = THEMES[one_of(self.state.theme, THEMES, "light")]
+        self.volume.recolour(theme)
+        self.preview.recolour(theme)
+        self.figures.refresh()
 
     def _against_changed(self, **_: Any) -> None:
         self.volume.synchronise()
@@ -652,6 +664,7 @@ def words(error: Exception) -> str:
         return "Not enough memory. Ask for less."
     if isinstance(error, OSError):
         return f"{error.strerror or error}: {error.filename or ''}"
+    logging.getLogger(__name__).error("This should not have happened.", exc_info=error)
     return f"It failed unexpectedly: {error!r}. Please report this."
 
 

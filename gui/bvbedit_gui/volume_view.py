@@ -13,6 +13,7 @@ from bvbedit.brdf.spline_brdf import SplineBrdf
 from bvbedit_gui import volume
 from bvbedit_gui.areas import SceneArea
 from bvbedit_gui.drawing import number
+from bvbedit_gui.given import one_of, real, whole
 from bvbedit_gui.themes import COLOUR_MAP, Theme
 from bvbedit_gui.volume_scene import DIFFERENCE_MAP, VIEWS, VolumeScene
 
@@ -26,6 +27,8 @@ TEXT_SIZE = 13
 MARGIN = 0.3
 # Marks of the colour bar are no closer than this, in per cent of it.
 APART = 10.0
+# Exponents that a value in 1/sr can have at all.
+DECADES = (-12.0, 300.0)
 STARTS: dict[str, Any] = {
     "what": "luminance",
     "what_items": [],
@@ -45,7 +48,7 @@ STARTS: dict[str, Any] = {
     "bar_ticks": [],
     "bar_title": "",
 }
-TITLES = {
+TITLES: dict[volume.What, str] = {
     "luminance": "luminance",
     "red": "red channel",
     "green": "green channel",
@@ -100,9 +103,14 @@ class VolumeView:
         items = [{"value": value, "title": title} for value, title in TITLES.items()]
         if self._viewer.other is None:
             items.pop()
-            if self.state.what == "difference":
+            if self.what == "difference":
                 self.state.what = "luminance"
         self.state.what_items = items
+
+    @property
+    def what(self) -> volume.What:
+        """What is asked for."""
+        return one_of(self.state.what, TITLES, "luminance")
 
     def refresh(self) -> None:
         """Draw the volume anew."""
@@ -110,10 +118,8 @@ class VolumeView:
         if shown is None:
             return
         state = self.state
-        what: volume.What = (
-            state.what if state.what in TITLES and (other is not None or state.what != "difference") else "luminance"
-        )
-        slices = [float(state[f"slice_{n}"]) if state[f"slice_{n}_on"] else None for n in range(3)]
+        what = self.what if other is not None or self.what != "difference" else "luminance"
+        slices = [real(state[f"slice_{n}"], 0.5, 0.0, 1.0) if state[f"slice_{n}_on"] else None for n in range(3)]
         wanted = bool(state.show_net), bool(state.show_knots)
         self.queue.ask(lambda: _draw(shown, chart, what, other, slices, *wanted, self._sampled), self._show)
 
@@ -151,8 +157,8 @@ class VolumeView:
             gap = float(np.log10(values[1] / values[0])) if len(values) > 1 else 0.5
             top = float(np.log10(values[-1])) if values else last
             state.update({"iso": round(top, 3), "iso_gap": min(round(gap, 2), 2.0), "iso_count": min(len(values), 3)})
-        elif not first <= _real(state.iso, first) <= last:
-            state.iso = float(np.clip(_real(state.iso, first), first, last))
+        elif real(state.iso, first, first, last) != state.iso:
+            state.iso = real(state.iso, first, first, last)
 
     def _colours(self, field: volume.Field, low: float, high: float) -> None:
         from matplotlib import colormaps
@@ -176,15 +182,15 @@ class VolumeView:
         state = self.state
         state.bar_css = f"linear-gradient(to right, {css})"
         state.bar_ticks = ticks
-        title = TITLES[state.what if state.what in TITLES else "luminance"]
+        title = TITLES[self.what]
         state.bar_title = f"{title} of f, 1/sr" if not field.signed else "luminance: more (+) or less (-), 1/sr"
 
     @property
     def iso_values(self) -> list[float]:
         """The values of the surfaces, 1/sr: the slider's, and below it as many as are asked for."""
         state = self.state
-        iso, gap = _real(state.iso, 0.0), max(_real(state.iso_gap, 1.0), 0.01)
-        count = int(np.clip(_real(state.iso_count, 1), 1, volume.MOST_SURFACES))
+        iso, gap = real(state.iso, 0.0, *DECADES), real(state.iso_gap, 1.0, 0.01, 10.0)
+        count = whole(state.iso_count, 1, 1, volume.MOST_SURFACES)
         return [10 ** (iso - k * gap) for k in range(count) if iso - k * gap >= np.log10(volume.FLOOR)]
 
     def show_surfaces(self) -> None:
@@ -193,15 +199,14 @@ class VolumeView:
             return
         values = self.iso_values
         self.state.iso_text = ", ".join(number(v) for v in values)
-        opacity = float(np.clip(_real(self.state.opacity, 0.5), 0.02, 1.0))
+        opacity = real(self.state.opacity, 0.5, 0.02, 1.0)
         self.scene.show_surfaces(volume.iso_surfaces(self.field, values), opacity)
         self.draw()
 
     def look_from(self, view: str) -> None:
         """Look at the box from a side."""
-        if view in VIEWS:
-            self.scene.look_from(view)
-            self.draw()
+        self.scene.look_from(one_of(view, VIEWS, "oblique"))
+        self.draw()
 
     def recolour(self, theme: Theme) -> None:
         """Take other colours for paper and ink."""
@@ -244,16 +249,6 @@ def _draw(
         if with_knots:
             knots = [volume.knot_planes(shown, axis) for axis in range(3)]
     planes = [
-        None if at is None else volume.slice_mesh(shown, chart, axis, float(np.clip(at, 0, 1)), what, other)
-        for axis, at in enumerate(slices)
+        None if at is None else volume.slice_mesh(shown, chart, axis, at, what, other) for axis, at in enumerate(slices)
     ]
     return _Drawn(chart, field, net, knots, planes)
-
-
-def _real(value: Any, otherwise: float) -> float:
-    """Return a number that came from a page, or another one where it is none."""
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        return otherwise
-    return number if np.isfinite(number) else otherwise
