@@ -11,7 +11,17 @@ from bvbedit_gui.viewer import OFFERED
 
 RUBBISH: tuple[Any, ...] = (
     *(None, "", " ", "x", "..", "../x.bvb", "/etc/passwd", "a\x00.bvb", "nan", "document 99", "document x", "document"),
-    *([], [None], ["a", 1], [1.0, float("nan"), 2], [[[]]], {}, {"a": 1}, {"width": None}, {"width": 1e300, "height": 1}),
+    *(
+        [],
+        [None],
+        ["a", 1],
+        [1.0, float("nan"), 2],
+        [[[]]],
+        {},
+        {"a": 1},
+        {"width": None},
+        {"width": 1e300, "height": 1},
+    ),
     *(True, False, float("nan"), float("inf"), -float("inf"), 1e308, -1e308, 1e-320, -1, 0, 2**64, 10**400, 7.5),
     *("é" * 300, "<b>", "{{ name }}", "knob_gain_factor", "-1", "1e400"),
 )
@@ -83,7 +93,7 @@ def _knob_choices(knob: Any) -> tuple[Any, ...]:
     high = 3 if knob.state == "knob_refine_factor" else knob.high
     numbers = [knob.start, knob.low, high, knob.first, min(knob.last, high)]
     if knob.parts:
-        return tuple([n] * len(knob.parts) for n in (knob.low, knob.first, knob.last)) + (knob.start,)
+        return knob.start, *([n] * len(knob.parts) for n in (knob.low, knob.first, knob.last))
     return (*numbers, None) if knob.optional else tuple(numbers)
 
 
@@ -147,7 +157,16 @@ class Monkey:
     def click(self, x: float, y: float) -> None:
         """Press and release the button there."""
         for kind in ("LeftButtonPress", "LeftButtonRelease"):
-            event = {"type": kind, "x": x, "y": y, "shiftKey": self.one(0, 1), "controlKey": 0, "altKey": 0}
+            event = {
+                "type": kind,
+                "x": x,
+                "y": y,
+                "shiftKey": self.one(0, 1),
+                "controlKey": 0,
+                "altKey": 0,
+                "w": 640,
+                "h": 480,
+            }
             self.viewer.volume.area.process_interaction_event(event)
 
 

@@ -42,7 +42,7 @@ def test_what_a_forgotten_task_raises_is_noticed(tmp_path):
         async def later() -> None:
             broken()
 
-        asyncio.get_running_loop().create_task(later())  # noqa: RUF006  (that it is forgotten is what is tested)
+        asyncio.get_running_loop().create_task(later())
         await asyncio.sleep(0.01)
 
     with pytest.raises(AssertionError, match="escaped: 1"):
