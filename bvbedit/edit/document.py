@@ -16,6 +16,7 @@ import numpy as np
 from bvbedit.brdf.plausibility import Plausibility, check
 from bvbedit.brdf.spline_brdf import SplineBrdf
 from bvbedit.brdf.structure import largest_change
+from bvbedit.edit.combining import Blend
 from bvbedit.edit.fitting import FitOptions
 from bvbedit.edit.operation import Edit
 from bvbedit.edit.operations import edit_of
@@ -139,6 +140,16 @@ class Document:
         steps = [edit.to_dict() for edit in (*self.past, *self.edits[: self.position])]
         names = {name: k + len(self.past) for name, k in self.names.items() if k <= self.position}
         return {"source": dict(self.source), "steps": steps, **({"names": names} if names else {})}
+
+    def needs(self, path: str | PathLike[str]) -> bool:
+        """Return whether the history would be lost with a file: it began with that, or blended it in."""
+        place = Path(path).resolve()
+        edits = (*self.past, *self.edits[: self.position])
+        if any(isinstance(edit, Blend) and edit.partner.resolve() == place for edit in edits):
+            return True
+        # With a past, the file is what was saved since, and stands for its source no more.
+        begun = self.source.get("file")
+        return begun is not None and Path(begun).resolve() == place and bool(edits) and not self.past
 
     def save(
         self, path: str | PathLike[str], *, precision: str | None = None, pdf: bool = False, made: str | None = None

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from trame.widgets import html
 from trame.widgets import vuetify3 as v3
 
+from bvbedit_gui.viewer import PRECISIONS
 from bvbedit_gui.widgets import COMPACT, marks, message, select
 
 if TYPE_CHECKING:
@@ -57,7 +58,7 @@ def dialogs(viewer: "Viewer") -> None:
     with _dialog("open", "Open"), v3.VCardText(classes="scroll", style="max-height: 65vh"):
         _choices(viewer)
         message("open")
-    with _dialog("save", "Save as"):
+    with _dialog("save", "Save or export"):
         with v3.VCardText(classes="pt-3"):
             v3.VTextField(
                 label=("'file, in ' + folder",),
@@ -72,15 +73,21 @@ def dialogs(viewer: "Viewer") -> None:
             select(
                 "control points stored as",
                 "save_precision",
-                ("['as it is', 'quantised', 'float16', 'float32', 'float64']",),
+                (f"{list(PRECISIONS)}",),
                 help="quantised and float16 are small; float64 keeps every bit.",
             )
             v3.VSwitch(
                 label="with the density for sampling (4 KB more, quicker to render)",
                 v_model=("save_pdf",),
+                v_show="!/[.](binary|npz)$/i.test(save_name)",
                 density="compact",
                 hide_details=True,
                 color="primary",
+            )
+            html.P(
+                "A name in .bvb keeps the model and its history; .binary is a MERL table, .npz a table on the model's "
+                "chart, for other tools.",
+                classes="text-caption text-medium-emphasis mt-1",
             )
             message("save")
             with v3.VAlert(v_if="save_confirm", type="warning", variant="tonal", density="compact", classes="mt-2"):
@@ -96,7 +103,12 @@ def dialogs(viewer: "Viewer") -> None:
             v3.VSpacer()
             v3.VBtn("Cancel", click="dialog = ''")
             v3.VBtn(
-                "Save", color="primary", variant="flat", click=(viewer.save_as, "[]"), **marks(data_test="save now")
+                "Save",
+                color="primary",
+                variant="flat",
+                loading=("saving",),
+                click=(viewer.save_as, "[]"),
+                **marks(data_test="save now"),
             )
     with _dialog("recipe", "Recipe", 680):
         with v3.VCardText():

@@ -114,7 +114,7 @@ class Page:
             # The response's own cookies are written before this is called.
             cookie: Morsel[str] = Morsel()
             cookie.set(self._cookie, self.key, self.key)
-            cookie.update({"httponly": True, "samesite": "Strict", "path": "/"})
+            cookie.update({"httponly": "yes", "samesite": "Strict", "path": "/"})
             response.headers.add("Set-Cookie", cookie.OutputString())
         response.headers["Referrer-Policy"] = "no-referrer"
         response.headers["X-Content-Type-Options"] = "nosniff"

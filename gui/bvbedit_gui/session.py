@@ -141,9 +141,9 @@ class Session:
         other = self.find(path)
         if other is not None and other != self.current:
             raise BvbError(f"{path.name} is open as another document. Close that first, or choose another name.")
-        if here.measurement is not None and here.measurement.file == path:
-            raise BvbError(f"{path.name} is the measurement itself. Choose another name.")
         document = here.known_document
+        if document.needs(path):
+            raise BvbError(f"{path.name} is what the history needs, and would be lost. Choose another name.")
         document.save(path, precision=precision, pdf=pdf)
         if here.path is not None and here.path != path:
             discard_autosave(here.path)

@@ -21,6 +21,7 @@ from bvbedit.edit.fitting import Fit, FitOptions
 from bvbedit.edit.operation import Edit
 from bvbedit.edit.operations import OPERATIONS
 from bvbedit.errors import BvbError
+from bvbedit.io.export import TABLES, export
 from bvbedit_gui import places as files
 from bvbedit_gui import tasks
 from bvbedit_gui.figures_view import FiguresView
@@ -63,6 +64,7 @@ FIT_STARTS: dict[str, Any] = {
     "fit_result": "",
     "can_fit_source": False,
 }
+PRECISIONS = ("as it is", "quantised", "float16", "float32", "float64")
 # Seconds of quiet after which unsaved work is kept.
 KEEPING = 1.0
 
@@ -116,6 +118,7 @@ class Viewer:
                 "save_precision": "as it is",
                 "save_pdf": False,
                 "save_confirm": "",
+                "saving": False,
                 "recipe": "",
                 "named": "",
                 "material_files": [],
@@ -265,9 +268,12 @@ class Viewer:
                 self.state.recipe = self.session.recipe()
 
     def _proposed_name(self, here: Opened) -> str:
-        if here.path is not None:
-            return self.session.places.shown(here.path)
-        return f"{Path(here.name).stem}.bvb"
+        if here.path is None:
+            return f"{Path(here.name).stem}.bvb"
+        if here.document is not None and here.document.needs(here.path):
+            # Saved over what it began with, the history could not be replayed.
+            return self.session.places.shown(here.path.with_stem(f"{here.path.stem}-edited"))
+        return self.session.places.shown(here.path)
 
     async def open_file(self, name: str) -> None:
         """Open a file: a model to edit, or a measurement to fit."""
@@ -358,32 +364,35 @@ class Viewer:
     # Saving
 
     def save(self) -> None:
-        """Save to the document's file; ask for a name where there is none."""
+        """Save to the document's file; ask for a name where there is none, or where the history needs that file."""
         if self.session.current is None:
             return
-        if self.session.here.path is None:
+        here = self.session.here
+        if here.path is None or (here.document is not None and here.document.needs(here.path)):
             self.show_dialog("save")
             return
-        self._save_to(self.session.here.path, None, pdf=False)
+        self._save_model(here.path, None, pdf=False)
 
-    def save_as(self, *, over: bool = False) -> None:
-        """Save under the name in the dialog; another file is replaced only when that was confirmed."""
+    async def save_as(self, *, over: bool = False) -> None:
+        """Save, or export, under the name in the dialog; another file is replaced only when that was confirmed."""
         with self.telling("save"):
-            name = str(self.state.save_name)
-            if not Path(name).suffix:
+            name = str(self.state.save_name).strip()
+            if name and not Path(name).suffix:
                 name += ".bvb"
-            path = self.session.places.path(name, files.MODELS)
+            path = self.session.places.path(name, (*files.MODELS, *TABLES))
             if path.exists() and path != self.session.here.path and not over:
                 self.state.save_confirm = f"{name} exists. Replace it?"
                 return
-            precision = self.state.save_precision
-            self._save_to(path, None if precision == "as it is" else precision, pdf=bool(self.state.save_pdf))
+            self.state.save_confirm = ""
+            if path.suffix.lower() in TABLES:
+                await self._export(path)
+                return
+            precision = one_of(self.state.save_precision, PRECISIONS, "as it is")
+            self._save_model(path, None if precision == "as it is" else precision, pdf=self.state.save_pdf is True)
 
-    def _save_to(self, path: Path, precision: str | None, *, pdf: bool) -> None:
+    def _save_model(self, path: Path, precision: str | None, *, pdf: bool) -> None:
         with self.telling("save"):
-            # A pending change is not part of the document: saying so beats saving something else than is seen.
-            if self.pending is not None:
-                raise BvbError("An edit is being tried. Apply it or cancel it, then save.")
+            self._check_settled()
             self.session.save(path, precision=precision, pdf=pdf)
             closing, self.state.closing = self.state.closing, None
             self.state.dialog = ""
@@ -391,10 +400,31 @@ class Viewer:
             self._synchronise()
             if closing is not None:
                 self.close(closing)
-        if self.state.error_save:
-            self.state.dialog = "save"
-            if not self.state.save_name:
-                self.state.save_name = path.name
+        if self.state.error_save and self.state.dialog != "save":
+            told = self.state.error_save
+            self.show_dialog("save")
+            self.state.error_save = told
+
+    async def _export(self, path: Path) -> None:
+        self._check_settled()
+        model = self.session.here.model
+        if any(o.measurement is not None and o.measurement.file == path for _, o in self.session):
+            raise BvbError(f"{path.name} is a measurement that is open. Choose another name.")
+        self.state.saving = True
+        self.state.flush()
+        try:
+            _, missed = await asyncio.get_running_loop().run_in_executor(self._pool, export, model, path)
+        finally:
+            self.state.saving = False
+        self.state.dialog = ""
+        self.state.toast = (
+            f"Exported {self.session.places.shown(path)}; read back, log_cosine_rms is {missed.grid.log_cosine_rms:.2g}"
+        )
+
+    def _check_settled(self) -> None:
+        """Raise BvbError while an edit is being tried: it is seen, but would not be in the file."""
+        if self.pending is not None:
+            raise BvbError("An edit is being tried. Apply it or cancel it, then save.")
 
     def _keep_soon(self) -> None:
         if self._saving is not None:

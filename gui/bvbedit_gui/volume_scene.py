@@ -182,7 +182,8 @@ class VolumeScene:
 
     def _largest_point(self, count: int) -> float:
         """Return pixels: a fifth of the mean distance of control points, were the box 30 lines of text high."""
-        return float(np.clip(30 * self.text_size / np.cbrt(max(count, 1)) / 5, self.text_size / 6, self.text_size / 1.5))
+        apart = 30 * self.text_size / np.cbrt(max(count, 1))
+        return float(np.clip(apart / 5, self.text_size / 6, self.text_size / 1.5))
 
 
 def _give(actor: "Actor", mesh: "DataSet | None") -> None:
