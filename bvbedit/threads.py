@@ -4,8 +4,12 @@ A few layers at once stay in the cache, and their temporaries need no fresh memo
 more than the arithmetic.
 """
 
+import os
+import sys
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from types import ModuleType
 from typing import TypeVar
 
 S = TypeVar("S")
@@ -48,3 +52,23 @@ def each_block(count: int, rows: int, work: Callable[[slice], T]) -> list[T]:
     """
     layers = max(1, ROWS // max(rows, 1))
     return side_by_side(work, [slice(start, min(start + layers, count)) for start in range(0, count, layers)])
+
+
+@contextmanager
+def one_matrix_thread() -> Iterator[None]:
+    """Let processes that are spawned meanwhile multiply matrices by one thread, and not run the main module again.
+
+    By several threads the last bits are others, and a recipe would not make the same fit again. What is done in them is
+    imported from its own module, and a script without a guard would start itself over and over.
+    """
+    main, threads = sys.modules["__main__"], os.environ.get("OPENBLAS_NUM_THREADS")
+    sys.modules["__main__"] = ModuleType("__main__")
+    os.environ["OPENBLAS_NUM_THREADS"] = "1"
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = main
+        if threads is None:
+            del os.environ["OPENBLAS_NUM_THREADS"]
+        else:
+            os.environ["OPENBLAS_NUM_THREADS"] = threads

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from bvbedit.brdf.base import BLOCK, Brdf, check_brdf
-from bvbedit.brdf.geometry import Floats, spherical
+from bvbedit.brdf.geometry import Bools, Floats, spherical
 from bvbedit.brdf.sample_sets import HIGHEST_ELEVATION, HORIZON_MARGIN, LARGEST_REFLECTANCE, MARGIN, draw, node_blocks
 from bvbedit.errors import BvbError
 from bvbedit.spline.arguments import is_whole, shown
@@ -148,11 +148,11 @@ def _paper(
     )
 
 
-def estimate(a: Brdf, b: Brdf, pairs: int = 50_000, seed: int = 3) -> Comparison:
+def estimate(a: Brdf, b: Brdf, pairs: int = 50_000, seed: int = 3, stride: int = STRIDES[2]) -> Comparison:
     """Return about what ``compare`` does, from so many pairs of each set drawn at random, in a fraction of a second.
 
     Where rare pairs decide, as at grazing mirror directions, it is uncertain by much. The paper's errors are those of
-    every fifth node of each axis. ``seed`` chooses the pairs.
+    every fifth node of each axis, or those that ``stride`` says. ``seed`` chooses the pairs.
     """
     drawn = draw(b, pairs, seed)
     fa, fb = a.evaluate_unit(drawn.wi, drawn.wo)[0], b.evaluate_unit(drawn.wi, drawn.wo)[0]
@@ -161,4 +161,17 @@ def estimate(a: Brdf, b: Brdf, pairs: int = 50_000, seed: int = 3) -> Comparison
         sums = _Sums()
         sums.add(fa[part], fb[part], drawn.wi[part, 2], drawn.wo[part, 2])
         found.append(sums.errors())
-    return Comparison(found[0], found[1], _paper(a, b, _elevations(STRIDES[2]), STRIDES[2]))
+    return Comparison(found[0], found[1], _paper(a, b, _elevations(stride), stride))
+
+
+def lengths_on_grid(b: Brdf, stride: int = 1) -> tuple[float, float]:
+    """Return the largest and the mean length of the RGB vector of ``b`` over the paper's nodes, in 1/sr."""
+    errors = _paper(Black(), b, _elevations(stride), stride)
+    return errors.e_max, errors.e_avg
+
+
+class Black(Brdf):
+    """Reflects nothing."""
+
+    def _evaluate(self, wi: Floats, wo: Floats) -> tuple[Floats, Bools]:
+        return np.zeros((len(wi), 3)), np.ones(len(wi), dtype=bool)

@@ -4,17 +4,15 @@ A fit holds the interpreter's lock for seconds, and NLopt cannot be interrupted;
 """
 
 import asyncio
-import os
-import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
-from types import ModuleType
 from typing import Any
 
 from bvbedit.errors import BvbError
+from bvbedit.threads import one_matrix_thread
 
 # What is done in the process: called with its arguments and a function that is told the share done. It and its
 # arguments must pickle.
@@ -41,7 +39,7 @@ class Worker:
             return
         self._pipe, other = get_context("spawn").Pipe()
         process = get_context("spawn").Process(target=_serve, args=(other,), daemon=True)
-        with _apart():
+        with one_matrix_thread():
             process.start()
         self._process = process
         other.close()
@@ -87,26 +85,6 @@ class Worker:
         if process is not None:
             process.kill()
             process.join(5)
-
-
-@contextmanager
-def _apart() -> Iterator[None]:
-    """Let a process that is started meanwhile not run the program's main module again, and multiply by one thread.
-
-    Tasks need nothing of the main module, and a script that opens a viewer would open another. By several threads the
-    last bits of matrix products are others, and a recipe would not make the same fit again.
-    """
-    main, threads = sys.modules["__main__"], os.environ.get("OPENBLAS_NUM_THREADS")
-    sys.modules["__main__"] = ModuleType("__main__")
-    os.environ["OPENBLAS_NUM_THREADS"] = "1"
-    try:
-        yield
-    finally:
-        sys.modules["__main__"] = main
-        if threads is None:
-            del os.environ["OPENBLAS_NUM_THREADS"]
-        else:
-            os.environ["OPENBLAS_NUM_THREADS"] = threads
 
 
 def _serve(pipe: Connection) -> None:

@@ -1,0 +1,254 @@
+"""Running a study: cell after cell in processes, each kept as it is done, so that an interrupted one goes on."""
+
+import json
+import os
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from dataclasses import replace
+from hashlib import sha256
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from bvbedit.brdf.materials import MATERIALS, material_named
+from bvbedit.edit.recipe import Source
+from bvbedit.errors import BvbError
+from bvbedit.io import make_folder
+from bvbedit.io.files import reading, replacing
+from bvbedit.study.cells import Task, measured, versions
+from bvbedit.study.plan import Configuration, Plan
+from bvbedit.study.table import to_csv
+from bvbedit.threads import one_matrix_thread
+
+SUFFIXES = (".binary", ".bsdf", ".npz")
+RESULTS, PLAN, VERSIONS, CELLS = "results.csv", "plan.json", "versions.json", "cells"
+# Seconds to wait for a scheduler.
+PATIENCE = 10
+
+Told = Callable[[int, int, dict[str, Any]], object]
+
+
+def materials_of(paths: Sequence[Path]) -> dict[str, Source]:
+    """Return the materials that paths name, by names of their own: files, folders with files, and sample materials.
+
+    Raises BvbError for a path that is nothing of it, a folder without materials, and none at all.
+    """
+    sources: list[Source] = []
+    for path in paths:
+        if path.is_dir():
+            inside = sorted(file for file in path.iterdir() if file.suffix.lower() in SUFFIXES)
+            if not inside:
+                raise BvbError(f"{path} holds no materials. Name a folder with files in {', '.join(SUFFIXES)}.")
+            sources += [Source(file=file) for file in inside]
+        elif path.exists():
+            sources.append(Source(file=path))
+        elif len(path.parts) == 1 and not path.suffix:
+            sources.append(_sample(str(path)))
+        else:
+            raise BvbError(f"{path} does not exist. Name a file, a folder, or a sample material.")
+    if not sources:
+        raise BvbError("No materials. Name files, folders or sample materials.")
+    names = [source.name for source in sources]
+    return {
+        (source.name if names.count(source.name) == 1 else f"{source.name} {n + 1}"): source
+        for n, source in enumerate(sources)
+    }
+
+
+def _sample(name: str) -> Source:
+    try:
+        material_named(name)
+    except BvbError:
+        known = ", ".join(MATERIALS)
+        raise BvbError(f"{name} is no file, no folder and no sample material. Samples: {known}.") from None
+    return Source(sample=name)
+
+
+def run_study(
+    plan: Plan,
+    materials: dict[str, Source],
+    out: Path,
+    *,
+    jobs: int = 1,
+    dask: str | None = None,
+    told: Told | None = None,
+) -> list[dict[str, Any]]:
+    """Measure all cells that are not measured yet, and return all rows; ``out`` keeps them, and the table.
+
+    ``jobs`` processes share the cells, or the workers of the Dask cluster at the address ``dask``, which must see the
+    files. ``told`` is called with how many cells are done, how many there are, and the newest row. A cell that cannot
+    be made is a row that says why. Results are the same whoever does it, but for times.
+    Raises BvbError where ``out`` holds the results of another plan or of other materials, where it cannot be written,
+    and where no cluster answers.
+    """
+    make_folder(out)
+    make_folder(out / CELLS)
+    _check_same(plan, materials, out)
+    tasks = {
+        _place(out, material, configuration): Task(
+            material, _absolute(source), configuration, plan.pictures, plan.stride
+        )
+        for material, source in materials.items()
+        for configuration in plan.configurations
+    }
+    done = sum(place.exists() for place in tasks)
+    todo = {place: task for place, task in tasks.items() if not place.exists()}
+    for place, row in _measured(todo, jobs, dask):
+        _write(place, row)
+        done += 1
+        if told is not None:
+            told(done, len(tasks), row)
+    rows = [json.loads(_text(place)) for place in tasks]
+    with replacing(out / RESULTS) as stream:
+        stream.write(to_csv(rows).encode())
+    return rows
+
+
+def _absolute(source: Source) -> Source:
+    """Return a source that a process in another folder finds, too."""
+    return source if source.file is None else replace(source, file=source.file.resolve())
+
+
+def _measured(todo: dict[Path, Task], jobs: int, dask: str | None) -> Iterator[tuple[Path, dict[str, Any]]]:
+    """Yield the rows as they are done."""
+    if not todo:
+        return
+    if dask is not None:
+        with _cluster(dask) as executor:
+            yield from _shared(executor, todo)
+        return
+    # One process, too, is another than ours: what matrices are multiplied by there is known, and memory is given back.
+    left = dict(todo)
+    try:
+        with _pool(min(jobs, len(left))) as executor:
+            for place, row in _shared(executor, todo):
+                del left[place]
+                yield place, row
+    except BrokenProcessPool:
+        # A process was lost, as when memory runs out, and with it what the others had in hand. One by one it shows
+        # which cell it is that cannot be done.
+        for place, task in left.items():
+            try:
+                with _pool(1) as executor:
+                    row = executor.submit(measured, task).result()
+            except BrokenProcessPool as error:
+                row = _lost(task, error)
+            yield place, row
+
+
+def _shared(executor: Executor, todo: dict[Path, Task]) -> Iterator[tuple[Path, dict[str, Any]]]:
+    futures: dict[Future[dict[str, Any]], Path] = {executor.submit(measured, task): p for p, task in todo.items()}
+    try:
+        for future in as_completed(futures):
+            yield futures[future], future.result()
+    finally:
+        for future in futures:
+            future.cancel()
+
+
+def _lost(task: Task, error: BrokenProcessPool) -> dict[str, Any]:
+    configuration = task.configuration
+    return {
+        "material": task.material,
+        "configuration": configuration.name,
+        "series": configuration.series,
+        "kind": "spline" if configuration.fit is not None else "analytic",
+        "status": "failed",
+        "reason": f"the process ended: {error}",
+    }
+
+
+@contextmanager
+def _pool(jobs: int) -> Iterator[Executor]:
+    # Spawned: a fork would inherit the locks of running threads.
+    with one_matrix_thread():
+        executor = ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), initializer=_share, initargs=(jobs,))
+        try:
+            yield executor
+        finally:
+            executor.shutdown(wait=True, cancel_futures=True)
+
+
+def _share(jobs: int) -> None:
+    """Let a process use its share of the processors, and leave Ctrl-C to who has started it."""
+    import signal
+
+    import numba
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    numba.set_num_threads(max(1, min(numba.config.NUMBA_NUM_THREADS, (os.cpu_count() or 1) // jobs)))
+
+
+@contextmanager
+def _cluster(address: str) -> Iterator[Executor]:
+    try:
+        from distributed import Client
+    except ImportError:
+        raise BvbError("A Dask cluster needs the package distributed: pip install 'bvbedit[study]'.") from None
+    try:
+        client = Client(address, timeout=PATIENCE, set_as_default=False)
+    except (OSError, TimeoutError, ValueError) as error:
+        raise BvbError(f"No Dask scheduler answers at {address} ({error}). Start one, or leave --dask out.") from None
+    try:
+        yield client.get_executor(pure=False)
+    finally:
+        client.close()
+
+
+def _place(out: Path, material: str, configuration: Configuration) -> Path:
+    joined = sha256(json.dumps([material, configuration.name]).encode())
+    return out / CELLS / f"{joined.hexdigest()[:24]}.json"
+
+
+def _check_same(plan: Plan, materials: dict[str, Source], out: Path) -> None:
+    """Keep what the results are of, or check that it is the same as before."""
+    told = {
+        "plan": plan.to_dict(),
+        "materials": {name: _sum(source) for name, source in materials.items()},
+        "scenes": {scene: _bytes_sum(Path(scene)) for scene in plan.pictures.scenes if Path(scene).exists()},
+    }
+    kept = out / PLAN
+    if kept.exists():
+        try:
+            before = json.loads(_text(kept))
+        except ValueError:
+            raise BvbError(f"{kept} is damaged. Remove {out}, or choose another --out.") from None
+        if before != json.loads(json.dumps(told)):
+            what = next((key for key in told if before.get(key) != json.loads(json.dumps(told[key]))), "plan")
+            raise BvbError(f"{out} holds results of other {what}. Choose another --out, or remove it.")
+    elif any((out / CELLS).iterdir()):
+        raise BvbError(f"{out} holds cells, but not their plan. Choose another --out, or remove it.")
+    else:
+        with replacing(kept) as stream:
+            stream.write(json.dumps(told, indent=1).encode())
+    with replacing(out / VERSIONS) as stream:
+        stream.write(json.dumps(dict(versions()), indent=1).encode())
+
+
+def _sum(source: Source) -> str:
+    return str(source) if source.file is None else _bytes_sum(source.file)
+
+
+def _bytes_sum(path: Path) -> str:
+    with reading(path) as stream:
+        joined = sha256()
+        while block := stream.read(1 << 20):
+            joined.update(block)
+    return joined.hexdigest()
+
+
+def _write(place: Path, row: dict[str, Any]) -> None:
+    with replacing(place) as stream:
+        stream.write(json.dumps(row).encode())
+
+
+def _text(path: Path) -> str:
+    with reading(path) as stream:
+        return stream.read().decode()
+
+
+def failed(rows: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return the rows of cells that could not be made."""
+    return [row for row in rows if row["status"] != "done"]
