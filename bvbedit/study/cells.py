@@ -19,6 +19,7 @@ from bvbedit.edit.recipe import Source
 from bvbedit.errors import BvbError
 from bvbedit.render import render
 from bvbedit.render.image_metrics import compare_pictures
+from bvbedit.spline.diagnostics import conditions
 from bvbedit.study.plan import Configuration, Pictures
 
 # The albedo is compared at these elevations, by so many directions drawn for the measurement, the same for both.
@@ -135,7 +136,7 @@ def _made(configuration: Configuration, brdf: Brdf) -> tuple[Brdf, dict[str, Any
             "numbers": int(np.prod(spline.size)) * 3 + inner,
             "file_bytes": len(written),
             "payload_bytes": payload_bytes(fitted),
-            "condition": _real(fitted.report.get("condition")),
+            "condition": max(conditions(spline)),
         }
     from bvbedit.brdf.analytic_fit import fit_analytic
 
