@@ -79,7 +79,7 @@ class Viewer:
         self.pending: tuple[Document, Edit, SplineBrdf] | None = None
         self.worker = Worker()
         self._pool = ThreadPoolExecutor(3, thread_name_prefix="viewer")
-        self._pending = self.latest("edit")
+        self._pending = Latest(self._pool, self._trial_failed)
         self._saving: asyncio.TimerHandle | None = None
         self._keep = Latest(ThreadPoolExecutor(1, thread_name_prefix="keep"), lambda e: self.tell("save", e))
         self._start_state()
@@ -243,6 +243,7 @@ class Viewer:
         self._drop_pending()
         self._synchronise()
         self.refresh()
+        self._try_edit()
         self._keep_soon()
 
     # Opening and closing
@@ -454,7 +455,9 @@ class Viewer:
         self._try_edit()
 
     def _is_touched(self) -> bool:
-        return any(_differs(self.state[knob.state], knob.start) for knob in knobs_of(self.op))
+        # Which file or axis is meant says nothing yet, and stays chosen after an edit.
+        knobs = [knob for knob in knobs_of(self.op) if knob.kind not in ("file", "axis")]
+        return any(_differs(self.state[knob.state], knob.start) for knob in knobs)
 
     def _try_edit(self) -> None:
         """Show what the edit in the panel would make of the model, without doing it."""
@@ -492,6 +495,11 @@ class Viewer:
             self.state.edit_note = _notes(model)
             self.refresh()
 
+    def _trial_failed(self, error: Exception) -> None:
+        with self.state:
+            self._drop_pending(redraw=True)
+            self.tell("edit", error)
+
     def _drop_pending(self, *, redraw: bool = False) -> None:
         self._pending.forget()
         was, self.pending = self.pending, None
@@ -513,7 +521,10 @@ class Viewer:
         if model is None:
             self.state.edit_note = "working ..."
             self.state.flush()
-            model = await asyncio.get_running_loop().run_in_executor(self._pool, edit.apply, document.model)
+            try:
+                model = await asyncio.get_running_loop().run_in_executor(self._pool, edit.apply, document.model)
+            finally:
+                self.state.edit_note = ""
         if self.session.current is None or self.session.here.document is not document:
             raise BvbError("The document has changed meanwhile. Do it again.")
         self.session.do(edit, model)
