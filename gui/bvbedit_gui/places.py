@@ -1,5 +1,6 @@
 """Where the viewer may read and write: files that the user named, and what lies under the folder it was started in."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -56,22 +57,32 @@ class Places:
     def files(self, suffixes: tuple[str, ...]) -> list[str]:
         """Return the files with one of the suffixes, named ones first, hidden ones left out, by name."""
         found = [path for path in sorted(self.named) if path.suffix.lower() in suffixes]
-        folders = [(self.folder, 0)]
-        while folders and len(found) < MOST_FILES:
-            folder, depth = folders.pop(0)
-            try:
-                inside = sorted(folder.iterdir())
-            except OSError:
-                continue  # a folder that may not be read holds nothing for us
-            for path in inside:
-                if path.name.startswith("."):
-                    continue
-                if path.is_dir() and not path.is_symlink() and depth < DEEPEST:
-                    folders.append((path, depth + 1))
-                elif path.suffix.lower() in suffixes and path.is_file() and self._allowed(path):
+        for folder in self.folders():
+            if len(found) >= MOST_FILES:
+                break
+            for path in _inside(folder):
+                if path.suffix.lower() in suffixes and path.is_file() and self.allowed(path):
                     found.append(path)
         return list(dict.fromkeys(self.shown(path) for path in found))[:MOST_FILES]
 
-    def _allowed(self, path: Path) -> bool:
+    def folders(self) -> Iterator[Path]:
+        """Yield the folder and those in it that are searched, hidden ones and links left out, upper ones first."""
+        folders = [(self.folder, 0)]
+        while folders:
+            folder, depth = folders.pop(0)
+            yield folder
+            if depth < DEEPEST:
+                folders += [(p, depth + 1) for p in _inside(folder) if p.is_dir() and not p.is_symlink()]
+
+    def allowed(self, path: Path) -> bool:
+        """Return whether what a path leads to, links followed, may be used."""
         resolved = path.resolve()
         return resolved in self.named or resolved.is_relative_to(self.folder)
+
+
+def _inside(folder: Path) -> list[Path]:
+    """Return what is in a folder, hidden files left out; one that may not be read holds nothing for us."""
+    try:
+        return [path for path in sorted(folder.iterdir()) if not path.name.startswith(".")]
+    except OSError:
+        return []

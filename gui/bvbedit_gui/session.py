@@ -34,6 +34,8 @@ class Opened:
     reference_name: str = ""
     measurement: Source | None = None
     """How a recipe names the reference, where that can be fitted."""
+    kept: Path | None = None
+    """The file beside which it was kept when the program ended, for one that was recovered."""
 
     @property
     def shown(self) -> Brdf:
@@ -74,6 +76,8 @@ class Session:
         self.places = places
         self._opened: dict[int, Opened] = {}
         self._next = 1
+        # What we keep for the case of a crash: beside which file, and what of it was kept last.
+        self._kept: dict[int, tuple[Path, Document | None]] = {}
         self.current: int | None = None
 
     def __iter__(self) -> Iterator[tuple[int, Opened]]:
@@ -105,6 +109,8 @@ class Session:
             name, n = f"{opened.name} ({n})", n + 1
         key, self._next = self._next, self._next + 1
         self._opened[key] = replace(opened, name=name)
+        if opened.kept is not None:
+            self._kept[key] = opened.kept, None
         self.current = key
         return key
 
@@ -116,9 +122,8 @@ class Session:
 
     def close(self, key: int) -> None:
         """Close a material; what was kept of it for the case of a crash is not wanted any more."""
-        closed = self._opened.pop(key)
-        if closed.path is not None:
-            discard_autosave(closed.path)
+        del self._opened[key]
+        self._forget(key)
         if self.current == key:
             self.current = next(reversed(self._opened), None)
 
@@ -145,10 +150,10 @@ class Session:
         if document.needs(path):
             raise BvbError(f"{path.name} is what the history needs, and would be lost. Choose another name.")
         document.save(path, precision=precision, pdf=pdf)
-        if here.path is not None and here.path != path:
-            discard_autosave(here.path)
-        discard_autosave(path)
         self.put(replace(here, name=path.name, path=path, saved=document))
+        assert self.current is not None  # there is a document
+        self._forget(self.current)
+        discard_autosave(path)
 
     def recipe(self) -> str:
         """Return how the model came about, as a recipe. Raises BvbError where there is no model."""
@@ -157,13 +162,58 @@ class Session:
         return to_toml(relative_to(self.places.folder, here.known_document.recipe()), [output])
 
     def keep(self) -> None:
-        """Keep what is unsaved beside its file, for the case of a crash."""
-        for _, opened in self:
-            if opened.unsaved and opened.document is not None:
-                autosave(opened.document, self._keeping_place(opened))
+        """Keep what is unsaved beside its file, for the case of a crash; may be called in another thread.
+
+        Raises BvbError where something cannot be kept, after all the others were.
+        """
+        failed = None
+        for key, opened in self:
+            try:
+                self._keep(key, opened)
+            except BvbError as error:
+                failed = error
+        if failed is not None:
+            raise failed
+
+    def _keep(self, key: int, opened: Opened) -> None:
+        document = opened.document
+        if document is None or not opened.unsaved:
+            self._forget(key)
+            return
+        place, last = self._kept.get(key, (None, None))
+        if place is None or (opened.path is not None and place != opened.path):
+            self._forget(key)
+            place = self._keeping_place(opened)
+        if last is document:
+            return
+        self._kept[key] = place, document
+        autosave(document, place)
+        # Closed or saved meanwhile, it is not to be offered.
+        now = self._opened.get(key)
+        if now is None or not now.unsaved:
+            self._kept.pop(key, None)
+            discard_autosave(place)
+
+    @property
+    def keeping(self) -> set[Path]:
+        """The files beside which something is kept that is open now."""
+        return {place for place, _ in self._kept.values()}
+
+    def _forget(self, key: int) -> None:
+        place, _ = self._kept.pop(key, (None, None))
+        if place is not None:
+            discard_autosave(place)
 
     def _keeping_place(self, opened: Opened) -> Path:
-        return opened.path or self.places.folder / f"{Path(opened.name).stem}.bvb"
+        """Return the file, which need not exist, beside which a material is kept: one that no other is kept beside."""
+        if opened.path is not None:
+            return opened.path
+        taken = self.keeping | {o.path for _, o in self}
+        stem = Path(opened.name).stem
+        path, n = self.places.folder / f"{stem}.bvb", 2
+        while path in taken or path.exists() or autosave_path(path).exists():
+            path, n = self.places.folder / f"{stem} ({n}).bvb", n + 1
+        return path
 
 
 def opened_file(path: Path, name: str) -> Opened:
@@ -192,12 +242,13 @@ def opened_recovered(path: Path, name: str) -> Opened | None:
     if path.exists():
         opened = Document.open(path)
         saved = opened if opened.source == document.source else None
-    return Opened(name, document, path if path.exists() else None, saved)
+    return Opened(name, document, path if path.exists() else None, saved, kept=path)
 
 
 def kept_files(places: Places) -> list[Path]:
     """Return the files in the folder, or named, of which something unsaved was kept."""
-    found = {path.with_name(path.name[1 : -len(".autosave")]) for path in places.folder.glob(".*.bvb.autosave")}
+    inside = (path for folder in places.folders() for path in folder.glob(".*.bvb.autosave"))
+    found = {path.with_name(path.name[1 : -len(".autosave")]) for path in inside if places.allowed(path)}
     found |= {path for path in places.named if autosave_path(path).exists()}
     return sorted(found)
 

@@ -16,6 +16,7 @@ from typing import Any
 from bvbedit.brdf.base import Brdf
 from bvbedit.brdf.charts import HALF_DIFF, Chart
 from bvbedit.brdf.spline_brdf import SplineBrdf
+from bvbedit.edit.autosave import autosave_path, discard_autosave
 from bvbedit.edit.document import Document
 from bvbedit.edit.fitting import Fit, FitOptions
 from bvbedit.edit.operation import Edit
@@ -81,7 +82,8 @@ class Viewer:
         self._pool = ThreadPoolExecutor(3, thread_name_prefix="viewer")
         self._pending = Latest(self._pool, self._trial_failed)
         self._saving: asyncio.TimerHandle | None = None
-        self._keep = Latest(ThreadPoolExecutor(1, thread_name_prefix="keep"), lambda e: self.tell("save", e))
+        self._keepers = ThreadPoolExecutor(1, thread_name_prefix="keep")
+        self._keep = Latest(self._keepers, lambda e: self.tell("save", e))
         self._start_state()
         theme = THEMES[self.state.theme]
         self.volume = VolumeView(self, theme)
@@ -254,7 +256,7 @@ class Viewer:
         self.state.material_files = here.files(files.MATERIALS)
         self.state.model_files = here.files(files.MODELS)
         self.state.scene_files = here.files(files.SCENES)
-        self.state.kept_files = [here.shown(path) for path in kept_files(here)]
+        self.state.kept_files = [here.shown(path) for path in kept_files(here) if path not in self.session.keeping]
 
     def show_dialog(self, name: str) -> None:
         """Open a dialog, or close the open one."""
@@ -299,6 +301,11 @@ class Viewer:
         """Open what was kept of a file when the program ended."""
         with self.telling("open"):
             path = self.session.places.path(name, files.MODELS)
+            if not self.session.places.allowed(autosave_path(path)):
+                raise BvbError(f"What was kept of {name} is a link to elsewhere. Remove it.")
+            known = self.session.find(path)
+            if known is not None:
+                raise BvbError(f"{name} is open. Close it, then recover what was kept of it.")
             loop = asyncio.get_running_loop()
             opened = await loop.run_in_executor(self._pool, opened_recovered, path, path.name)
             if opened is None:
@@ -307,8 +314,6 @@ class Viewer:
 
     def discard_kept(self, name: str) -> None:
         """Remove what was kept of a file."""
-        from bvbedit.edit.autosave import discard_autosave
-
         with self.telling("open"):
             discard_autosave(self.session.places.path(name, files.MODELS))
         self.list_files()
@@ -686,10 +691,11 @@ class Viewer:
 
     def end(self) -> None:
         """Keep what is unsaved, and end threads and processes."""
-        with suppress(BvbError, OSError):
-            self.session.keep()
         if self._saving is not None:
             self._saving.cancel()
+        self._keepers.shutdown(wait=True, cancel_futures=True)
+        with suppress(BvbError, OSError):
+            self.session.keep()
         self.worker.close()
         self.preview.close()
         self._pool.shutdown(wait=True, cancel_futures=True)
