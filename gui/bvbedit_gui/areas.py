@@ -76,6 +76,8 @@ class SceneArea:
         """Turn the scene, or report a click with its place and whether the shift key was down."""
         self.moved()
         kind = event.get("type")
+        if not isinstance(kind, str):
+            return
         here = real(event.get("x"), -1.0), real(event.get("y"), -1.0)
         if kind == "LeftButtonPress":
             self._pressed = here

@@ -35,6 +35,7 @@ class Picking:
         self.state.update(STARTS)
         self._picked: list[int] = []
         self._of: SplineBrdf | None = None
+        self._inserting: asyncio.Task[None] | None = None
 
     def clicked(self, x: float, y: float, shift: bool) -> None:
         """Pick the control point there, or insert a knot there, as the mode says."""
@@ -50,7 +51,8 @@ class Picking:
         elif self.state.mode == "knot":
             place = viewer.volume.scene.place_on_axis(x, y, AXIS_REACH)
             if place is not None and 0 < place[1] < 1:
-                asyncio.get_running_loop().create_task(viewer.insert_knot(*place))
+                # The loop itself would not hold it.
+                self._inserting = asyncio.get_running_loop().create_task(viewer.insert_knot(*place))
 
     def pick(self, point: int, *, more: bool = False) -> None:
         """Pick a control point by its number, perhaps beside those that are picked: the region spans them all."""

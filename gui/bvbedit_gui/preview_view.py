@@ -63,6 +63,8 @@ class PreviewView:
             with self._viewer.telling("preview"):
                 scene = self._viewer.session.places.path(str(scene), files.SCENES)
             if self.state.error_preview:
+                # Later passes of what was seen before would take the words away.
+                self._wish = self._shown = None
                 return
         wish = Wish(shown, other, scene, self._side(1 if other is None else 2 if self.layout == "beside" else 3))
         self._wish = wish
