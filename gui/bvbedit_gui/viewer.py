@@ -146,6 +146,7 @@ class Viewer:
         on("op", "live")(self._op_changed)
         on(*starts(), *region_starts())(self._knob_changed)
         on("current")(self._current_changed)
+        on("dialog")(self._dialog_changed)
 
     def start(self) -> None:
         """Show what is open already. Needs a running event loop."""
@@ -346,6 +347,11 @@ class Viewer:
             self._go_to_document(key)
         elif current != self.session.current:
             self.state.current = self.session.current
+
+    def _dialog_changed(self, **_: Any) -> None:
+        # Who leaves the dialogs about closing does not want to close: a later save is only a save.
+        if self.state.dialog not in ("close", "save"):
+            self.state.closing = None
 
     def _known(self, key: Any) -> int | None:
         """Return the key of an open document, or None for anything else that a page has sent."""

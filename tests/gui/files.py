@@ -5,15 +5,15 @@ from typing import Any
 
 import numpy as np
 
+import bvbedit
 from bvbedit.brdf.spline_brdf import SplineBrdf
-from bvbedit.edit.document import Document
 from tests.edit.samples import smooth
 
 
 def model_file(folder: Path, name: str = "gold.bvb", model: SplineBrdf | None = None) -> Path:
     """Write a small model in full precision; return the path."""
     path = folder / name
-    Document.of(model or smooth(), file=str(path)).save(path, precision="float64")
+    bvbedit.save(model or smooth(), path, precision="float64")
     return path
 
 
