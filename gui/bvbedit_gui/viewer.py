@@ -616,6 +616,8 @@ class Viewer:
                 options["tolerance"] = float(state.fit_tolerance)
             elif state.fit_by == "size":
                 options["size"] = tuple(int(n) for n in state.fit_size)
+            elif state.fit_by != "knee":
+                raise BvbError("Choose by what the size of the fit is found: bytes, tolerance, size or by itself.")
         except (TypeError, ValueError, OverflowError):
             raise BvbError("A field of the fit is no number. Fill it in.") from None
         return options
@@ -623,7 +625,7 @@ class Viewer:
     async def fit(self) -> None:
         """Fit the measurement, or the present model anew, in another process."""
         state = self.state
-        if state.fitting:
+        if self.worker.busy:
             return
         with self.telling("fit"):
             here = self.session.here

@@ -52,6 +52,7 @@ class Worker:
         if self.busy:
             raise BvbError("Something is being worked on already. Stop it, or wait.")
         self.busy = True
+        process = None
         try:
             self.warm()
             pipe, process = self._pipe, self._process
@@ -71,10 +72,10 @@ class Worker:
                 if progress is not None:
                     progress(value)
         except (EOFError, OSError):
-            stopped = self._process is None
-            self.close()
-            if stopped:
+            # Another process may have been started since.
+            if self._process is not process:
                 raise Stopped("Stopped. Nothing was changed.") from None
+            self.close()
             raise BvbError("The process that worked on it has ended, perhaps for want of memory. Try less.") from None
         finally:
             self.busy = False
