@@ -11,6 +11,7 @@ import secrets
 import socket
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from http.cookies import Morsel
 from pathlib import Path
 from typing import Any
@@ -107,6 +108,13 @@ class Page:
         return task
 
     def _guard(self, server: Any) -> None:
+        from aiohttp import web
+
+        async def no_manager(_: Any) -> Any:
+            return web.json_response(None)
+
+        # Pages ask a manager of servers first, to be told that there is none: without an answer, they log an error.
+        server.app.router.add_post("/paraview/", no_manager)
         server.app.on_response_prepare.append(self._leave_cookie)
 
     async def _leave_cookie(self, request: Any, response: Any) -> None:
@@ -184,7 +192,11 @@ def view(
     if materials:
         session.current = next(iter(session))[0]
     page = Page(session, host=host, port=port)
-    asyncio.run(_serve(page, browser, tell))
+    from aiohttp.web import GracefulExit
+
+    # Ctrl-C is how it is ended, which the server turns into an exit with a status of failure.
+    with suppress(KeyboardInterrupt, GracefulExit):
+        asyncio.run(_serve(page, browser, tell))
 
 
 def compared_with(opened: Opened, reference: Brdf, name: str) -> Opened:
@@ -205,6 +217,7 @@ async def _serve(page: Page, browser: bool, tell: Callable[[str], object]) -> No
         if browser:
             _open_browser(page.url)
 
+    asyncio.get_running_loop().set_exception_handler(_closed_tabs_pass)
     serving = page.start(ready)
     try:
         await serving
@@ -212,6 +225,12 @@ async def _serve(page: Page, browser: bool, tell: Callable[[str], object]) -> No
         pass
     finally:
         page.viewer.end()
+
+
+def _closed_tabs_pass(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+    """Report what went wrong in the event loop, but not that a tab was closed while a picture was sent to it."""
+    if not isinstance(context.get("exception"), ConnectionError):
+        loop.default_exception_handler(context)
 
 
 def _open_browser(url: str) -> None:
