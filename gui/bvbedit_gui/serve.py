@@ -15,6 +15,7 @@ from contextlib import suppress
 from http.cookies import Morsel
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 from bvbedit.brdf.base import Brdf
 from bvbedit.brdf.spline_brdf import SplineBrdf
@@ -150,7 +151,10 @@ def _gate(key: str, cookie: str) -> Any:
             self._trusted: set[str] = set()
 
         def onConnect(self, request: Any, client: str) -> None:  # noqa: N802
-            if _equal(request.cookies.get(cookie, ""), key):
+            # Cookies go to all ports of a machine: pages of other servers on it must not come in by ours.
+            origin = request.headers.get("Origin")
+            own = origin is None or urlsplit(origin).netloc == request.host
+            if own and _equal(request.cookies.get(cookie, ""), key):
                 self._trusted.add(client)
 
         def onClose(self, client: str) -> None:  # noqa: N802

@@ -4,13 +4,15 @@ import os
 import re
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from io import BytesIO
 from pathlib import Path
+from threading import Thread
 from time import monotonic, sleep
 from typing import Any
 
@@ -23,11 +25,11 @@ from bvbedit_gui.volume_scene import HALVES, LINES, VIEWS
 from bvbedit_gui.volume_view import TEXT_SIZE
 
 # Milliseconds that anything in the page may take on a slow machine.
-PATIENCE = 20_000
-ARGUMENTS = (
-    "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
-    "--disable-component-update --disable-sync"
-).split()
+PATIENCE = 60_000
+ARGUMENTS = [
+    *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"),
+    *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
+]
 COMMAND = [sys.executable, "-c", "from bvbedit.cli import main; main()"]
 
 
@@ -217,3 +219,44 @@ def until(holds: Callable[[], bool], seconds: float = PATIENCE / 1000) -> bool:
             return False
         sleep(0.05)
     return True
+
+
+class Relay:
+    """Stands between a browser and a viewer, and can cut all connections, as a network does."""
+
+    def __init__(self, port: int) -> None:
+        self._to = port
+        self._open: list[socket.socket] = []
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self.port: int = self._listener.getsockname()[1]
+        Thread(target=self._accept, daemon=True).start()
+
+    def _accept(self) -> None:
+        with suppress(OSError):
+            while True:
+                ours, _ = self._listener.accept()
+                theirs = socket.create_connection(("127.0.0.1", self._to))
+                self._open += [ours, theirs]
+                for a, b in ((ours, theirs), (theirs, ours)):
+                    Thread(target=self._pump, args=(a, b), daemon=True).start()
+
+    def _pump(self, a: socket.socket, b: socket.socket) -> None:
+        with suppress(OSError):
+            while received := a.recv(1 << 16):
+                b.sendall(received)
+        for end in (a, b):
+            with suppress(OSError):
+                end.shutdown(socket.SHUT_RDWR)
+
+    def cut(self) -> None:
+        """End all connections that stand; new ones can be made."""
+        cut, self._open = self._open, []
+        for end in cut:
+            with suppress(OSError):
+                end.shutdown(socket.SHUT_RDWR)
+            end.close()
+
+    def close(self) -> None:
+        """End for good."""
+        self._listener.close()
+        self.cut()
