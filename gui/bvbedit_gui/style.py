@@ -83,8 +83,11 @@ SCRIPT = """
     event.preventDefault();
     window.trame.trigger(name);
   });
+  // Before trame's own, which ends the connection even of those who then choose to stay.
   window.addEventListener("beforeunload", function (event) {
-    if (window.trame && window.trame.state.get("unsaved")) event.preventDefault();
-  });
+    if (!window.trame || !window.trame.state.get("unsaved")) return;
+    event.preventDefault();
+    event.stopImmediatePropagation();
+  }, true);
 })();
 """
