@@ -1,4 +1,4 @@
-"""Who may edit: nobody without the key, whatever is asked for, and nobody from elsewhere; and where nothing is drawn."""
+"""Who may edit: nobody without the key, whatever is asked for, and nobody from elsewhere; what cannot draw says so."""
 
 import asyncio
 import socket
