@@ -83,11 +83,13 @@ SCRIPT = """
     event.preventDefault();
     window.trame.trigger(name);
   });
-  // Before trame's own, which ends the connection even of those who then choose to stay.
-  window.addEventListener("beforeunload", function (event) {
-    if (!window.trame || !window.trame.state.get("unsaved")) return;
-    event.preventDefault();
-    event.stopImmediatePropagation();
-  }, true);
+  function asks() { return window.trame && window.trame.state && window.trame.state.get("unsaved"); }
+  window.addEventListener("beforeunload", function (event) { if (asks()) event.preventDefault(); });
+  // Trame ends the connection before it is known whether the user leaves; who leaves does not need it ended.
+  const close = WebSocket.prototype.close;
+  WebSocket.prototype.close = function () {
+    if (window.event && window.event.type === "beforeunload" && asks()) return;
+    close.apply(this, arguments);
+  };
 })();
 """
