@@ -134,6 +134,11 @@ class Desk:
         """Return a variable of the page."""
         return self.page.evaluate("name => window.trame.state.get(name)", name)
 
+    def known(self, name: str) -> Any:
+        """Return what the server knows a variable to be: the page's changes are on their way to it for a moment."""
+        asked = "name => window.trame.client.getRemote().Trame.getState().then(known => known.state[name])"
+        return self.page.evaluate(asked, name)
+
     def wait(self, name: str, holds: str, timeout: float = PATIENCE) -> Any:
         """Wait until a JavaScript function holds of a variable of the page; return its value."""
         self.page.wait_for_function(

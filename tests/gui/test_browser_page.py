@@ -105,7 +105,8 @@ def test_reload_second_tab_and_a_cut_connection(context, folder, relay):
         desk.fill("theta_i", 30)
         desk.click("tab history")
         kept = ("history", "theta_i", "tab", "iso", "current", "unsaved")
-        desk.wait("theta_i", "theta => theta === 30")
+        for name, value in (("theta_i", 30), ("tab", "history")):
+            desk.soon(lambda name=name: desk.known(name), lambda known, value=value: known == value)
         before = {name: desk.state(name) for name in kept}
         desk.page.reload()
         desk.wait("documents", "documents => documents && documents.length === 1")
