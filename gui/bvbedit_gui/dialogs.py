@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from trame.widgets import html
 from trame.widgets import vuetify3 as v3
 
-from bvbedit_gui.viewer import PRECISIONS
+from bvbedit_gui.saving import PRECISIONS
 from bvbedit_gui.widgets import COMPACT, marks, message, select
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def dialogs(viewer: "Viewer") -> None:
                 label=("'file, in ' + folder",),
                 v_model=("save_name",),
                 update_modelValue="save_name = $event; save_confirm = ''",
-                keydown_enter=(viewer.save_as, "[]"),
+                keydown_enter=(viewer.saving.save_as, "[]"),
                 autofocus=True,
                 **marks(data_test="save name"),
                 classes="mb-3",
@@ -96,7 +96,7 @@ def dialogs(viewer: "Viewer") -> None:
                     "Replace",
                     size="small",
                     classes="ml-2",
-                    click=(viewer.save_as, "[]", "{ over: true }"),
+                    click=(viewer.saving.save_as, "[]", "{ over: true }"),
                     **marks(data_test="replace"),
                 )
         with v3.VCardActions():
@@ -107,7 +107,7 @@ def dialogs(viewer: "Viewer") -> None:
                 color="primary",
                 variant="flat",
                 loading=("saving",),
-                click=(viewer.save_as, "[]"),
+                click=(viewer.saving.save_as, "[]"),
                 **marks(data_test="save now"),
             )
     with _dialog("recipe", "Recipe", 680):
@@ -139,10 +139,12 @@ def dialogs(viewer: "Viewer") -> None:
             v3.VBtn(
                 "Close it",
                 color="error",
-                click=(viewer.close, "[closing]", "{ discard: true }"),
+                click=(viewer.opening.close, "[closing]", "{ discard: true }"),
                 **marks(data_test="discard"),
             )
-            v3.VBtn("Save", color="primary", variant="flat", click=viewer.save, **marks(data_test="save and close"))
+            v3.VBtn(
+                "Save", color="primary", variant="flat", click=viewer.saving.save, **marks(data_test="save and close")
+            )
     with _dialog("help", "Help", 640):
         with v3.VCardText(classes="scroll", style="max-height: 70vh"):
             for title, text in HELP:
@@ -178,10 +180,10 @@ def _choices(viewer: "Viewer") -> None:
                 "Recover",
                 size="x-small",
                 color="primary",
-                click=(viewer.recover, "[name]"),
+                click=(viewer.opening.recover, "[name]"),
                 **marks(data_test="recover"),
             )
-            v3.VBtn("Discard", size="x-small", variant="text", click=(viewer.discard_kept, "[name]"))
+            v3.VBtn("Discard", size="x-small", variant="text", click=(viewer.opening.discard_kept, "[name]"))
     html.H3("Files in {{ folder }}", classes="text-subtitle-2")
     html.P(
         "No materials here: models (.bvb), MERL (.binary), RGL (.bsdf) and tables (.npz) would be listed.",
@@ -197,7 +199,7 @@ def _choices(viewer: "Viewer") -> None:
             variant="tonal",
             classes="text-none ma-1",
             loading=("opening === name",),
-            click=(viewer.open_file, "[name]"),
+            click=(viewer.opening.open_file, "[name]"),
             **marks(data_test="file"),
         )
     html.H3("Samples", classes="text-subtitle-2 mt-3")
@@ -209,7 +211,7 @@ def _choices(viewer: "Viewer") -> None:
             variant="tonal",
             classes="text-none ma-1 sample",
             height="auto",
-            click=(viewer.open_sample, "[sample.name]"),
+            click=(viewer.opening.open_sample, "[sample.name]"),
             **marks(data_test="sample"),
         ),
         html.Div(classes="sample-inner"),

@@ -23,8 +23,8 @@ def build(viewer: "Viewer") -> None:
     server.state.trame__template_error_reconnect = (
         '<trame-reconnect :max-retry="100000" :delay="1000" message="The connection is lost; trying again ..."/>'
     )
-    for name in ("undo", "redo", "save"):
-        server.trigger(name)(getattr(viewer, name))
+    for name, method in (("undo", viewer.editing.undo), ("redo", viewer.editing.redo), ("save", viewer.saving.save)):
+        server.trigger(name)(method)
     with DivLayout(server):
         client.Style(STYLE)
         client.Script(SCRIPT)
@@ -61,7 +61,7 @@ def _bar(viewer: "Viewer") -> None:
                 help="The material that is worked on; a dot says that it is not saved.",
             )
         button("mdi-folder-open-outline", "Open ...", (viewer.show_dialog, "['open']"), test="open")
-        button("mdi-content-save-outline", "Save (Ctrl+S)", viewer.save, disabled="!is_model", test="save")
+        button("mdi-content-save-outline", "Save (Ctrl+S)", viewer.saving.save, disabled="!is_model", test="save")
         button(
             "mdi-content-save-edit-outline",
             "Save as ...",
@@ -76,10 +76,12 @@ def _bar(viewer: "Viewer") -> None:
             disabled="!is_model",
             test="recipe",
         )
-        button("mdi-close", "Close this material", (viewer.close, "[]"), disabled="!documents.length", test="close")
+        button(
+            "mdi-close", "Close this material", (viewer.opening.close, "[]"), disabled="!documents.length", test="close"
+        )
         v3.VDivider(vertical=True, classes="mx-1")
-        button("mdi-undo", "Undo (Ctrl+Z)", viewer.undo, disabled="!can_undo && !edit_pending", test="undo")
-        button("mdi-redo", "Redo (Ctrl+Shift+Z)", viewer.redo, disabled="!can_redo", test="redo")
+        button("mdi-undo", "Undo (Ctrl+Z)", viewer.editing.undo, disabled="!can_undo && !edit_pending", test="undo")
+        button("mdi-redo", "Redo (Ctrl+Shift+Z)", viewer.editing.redo, disabled="!can_redo", test="redo")
         v3.VSpacer()
         with html.Div(style="width: 220px", v_show="documents.length"):
             select(

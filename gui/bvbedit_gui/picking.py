@@ -52,7 +52,7 @@ class Picking:
             place = viewer.volume.scene.place_on_axis(x, y, AXIS_REACH)
             if place is not None and 0 < place[1] < 1:
                 # The loop itself would not hold it.
-                self._inserting = asyncio.get_running_loop().create_task(viewer.insert_knot(*place))
+                self._inserting = asyncio.get_running_loop().create_task(viewer.editing.insert_knot(*place))
 
     def pick(self, point: int, *, more: bool = False) -> None:
         """Pick a control point by its number, perhaps beside those that are picked: the region spans them all."""
@@ -85,7 +85,7 @@ class Picking:
         phi = float(np.degrees(np.arctan2(abs(cross), float(wi[0, :2] @ wo[0, :2]))))
         f = model.evaluate(wi, wo)[0]
         self.state.probe = [round(float(p), 4) for p in place]
-        if self._viewer.op != "move_points" or not self.state.edit_pending:
+        if self._viewer.editing.op != "move_points" or not self.state.edit_pending:
             self.state.knob_move_points_at = [round(theta_i, 2), round(theta_o, 2), round(phi, 2)]
             self.state.knob_move_points_rgb = [float(f"{v:.4g}") for v in f]
 
@@ -123,7 +123,7 @@ class Picking:
         chosen = np.zeros((0, 3))
         try:
             region = region_of(self.state)
-            if region and is_regional(viewer.op):
+            if region and is_regional(viewer.editing.op):
                 named: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in region.items()}
                 reached = Region(**named).weights(model.chart, points) > BELONGS
                 # Where nearly all are, marking them would hide the rest of the picture and tell nothing.

@@ -6,8 +6,8 @@ from trame.widgets import html
 from trame.widgets import vuetify3 as v3
 
 from bvbedit.edit.operations import OPERATIONS
+from bvbedit_gui.editing import OFFERED
 from bvbedit_gui.knobs import ANGLES, is_regional, knobs_of
-from bvbedit_gui.viewer import OFFERED
 from bvbedit_gui.widgets import COMPACT, axis_name, hint, knob_row, marks, message, number_row, select, toggle, variable
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ def _edit(viewer: "Viewer") -> None:
                 "Apply",
                 color="primary",
                 size="small",
-                click=viewer.apply_edit,
+                click=viewer.editing.apply,
                 classes="mr-2",
                 **marks(data_test="apply"),
             )
@@ -74,7 +74,7 @@ def _edit(viewer: "Viewer") -> None:
                 "Cancel",
                 size="small",
                 variant="tonal",
-                click=viewer.cancel_edit,
+                click=viewer.editing.cancel,
                 disabled=("!edit_pending",),
                 **marks(data_test="cancel"),
             )
@@ -100,7 +100,7 @@ def _region(viewer: "Viewer") -> None:
             size="x-small",
             variant="text",
             classes="text-none",
-            click=viewer.reset_region,
+            click=viewer.editing.reset_region,
             **marks(data_test="everywhere"),
         )
     for name in ANGLES:
@@ -252,7 +252,7 @@ def _fit(viewer: "Viewer") -> None:
                 "Fit",
                 color="primary",
                 size="small",
-                click=viewer.fit,
+                click=viewer.fitting.fit,
                 disabled=("fitting || !documents.length",),
                 classes="mr-2",
                 **marks(data_test="fit"),
@@ -261,7 +261,7 @@ def _fit(viewer: "Viewer") -> None:
                 "Stop",
                 size="small",
                 variant="tonal",
-                click=viewer.stop_fit,
+                click=viewer.fitting.stop,
                 disabled=("!fitting",),
                 **marks(data_test="stop"),
             )
@@ -378,7 +378,7 @@ def _history(viewer: "Viewer") -> None:
                 key=("n",),
                 active=("step.here",),
                 disabled=("step.past",),
-                click=(viewer.go_to, "[step.position]"),
+                click=(viewer.editing.go_to, "[step.position]"),
                 classes="px-2",
                 density="compact",
             ),
@@ -391,11 +391,11 @@ def _history(viewer: "Viewer") -> None:
             v3.VTextField(
                 label="name of this state",
                 v_model=("named",),
-                keydown_enter=viewer.name_state,
+                keydown_enter=viewer.editing.name_state,
                 **marks(data_test="named"),
                 **COMPACT,
             )
-            v3.VBtn("Name it", size="small", variant="tonal", click=viewer.name_state, classes="ml-2")
+            v3.VBtn("Name it", size="small", variant="tonal", click=viewer.editing.name_state, classes="ml-2")
         html.P(
             "Click a line to go there. Lines marked before were done before the file was opened.",
             classes="text-caption text-medium-emphasis mt-2",

@@ -6,8 +6,8 @@ from random import Random
 from typing import Any
 
 from bvbedit.spline.tensor import TensorSpline
+from bvbedit_gui.editing import OFFERED
 from bvbedit_gui.knobs import knobs_of
-from bvbedit_gui.viewer import OFFERED
 
 RUBBISH: tuple[Any, ...] = (
     *(None, "", " ", "x", "..", "../x.bvb", "/etc/passwd", "a\x00.bvb", "nan", "document 99", "document x", "document"),
@@ -108,22 +108,22 @@ class Monkey:
         self.variables = sorted(k for k in viewer.state.to_dict() if not k.startswith("trame__"))
         v = viewer
         self.methods: list[tuple[int, Callable[..., Any], Callable[[], tuple[Any, ...]]]] = [
-            (6, v.apply_edit, tuple),
-            (2, v.cancel_edit, tuple),
-            (4, v.undo, tuple),
-            (3, v.redo, tuple),
-            (2, v.go_to, lambda: (self.one(0, 0, 1, 2, 5),)),
-            (2, v.name_state, tuple),
-            (2, v.save, tuple),
-            (3, lambda over: v.save_as(over=over), lambda: (self.one(True, False),)),
-            (2, v.open_file, lambda: (self.one(*NAMES),)),
-            (1, v.open_sample, lambda: (self.one("chrome", "matte-paper", "unknown"),)),
-            (1, v.recover, lambda: (self.one(*NAMES),)),
-            (1, v.discard_kept, lambda: (self.one(*NAMES),)),
+            (6, v.editing.apply, tuple),
+            (2, v.editing.cancel, tuple),
+            (4, v.editing.undo, tuple),
+            (3, v.editing.redo, tuple),
+            (2, v.editing.go_to, lambda: (self.one(0, 0, 1, 2, 5),)),
+            (2, v.editing.name_state, tuple),
+            (2, v.saving.save, tuple),
+            (3, lambda over: v.saving.save_as(over=over), lambda: (self.one(True, False),)),
+            (2, v.opening.open_file, lambda: (self.one(*NAMES),)),
+            (1, v.opening.open_sample, lambda: (self.one("chrome", "matte-paper", "unknown"),)),
+            (1, v.opening.recover, lambda: (self.one(*NAMES),)),
+            (1, v.opening.discard_kept, lambda: (self.one(*NAMES),)),
             (2, v.show_dialog, lambda: (self.one("open", "save", "recipe", "help", ""),)),
-            (1, v.close, tuple),
-            (1, lambda key: v.close(key, discard=True), lambda: (self.one(1, 2, 3),)),
-            (2, v.reset_region, tuple),
+            (1, v.opening.close, tuple),
+            (1, lambda key: v.opening.close(key, discard=True), lambda: (self.one(1, 2, 3),)),
+            (2, v.editing.reset_region, tuple),
             (1, v.volume.look_from, lambda: (self.one("oblique", "0", "1", "2"),)),
             (1, v.lobes.look_from, lambda: (self.one("oblique", "side", "top"),)),
             (5, self.click, lambda: (self.random.uniform(0, 640), self.random.uniform(0, 480))),

@@ -7,8 +7,8 @@ import pytest
 
 from bvbedit.edit.document import digest
 from bvbedit.edit.operations import edit_of_line
+from bvbedit_gui.editing import OFFERED
 from bvbedit_gui.knobs import knobs_of
-from bvbedit_gui.viewer import OFFERED
 from tests.edit.samples import smooth
 from tests.gui.files import dimmed, model_file
 from tests.gui.opengl import needs_opengl
@@ -76,9 +76,9 @@ def test_apply_records_what_was_shown(name, folder):
             loud = edit.op in ("gain", "tint", "broaden", "sharpen", "raise_grazing", "blend", "move_points")
             change = np.abs(viewer.preview.seen.picture - picture).max() / picture.max()
             assert change > 0.01 or not loud
-            await do(viewer, viewer.apply_edit)
+            await do(viewer, viewer.editing.apply)
         assert not viewer.state.edit_pending
-        assert viewer.pending is None
+        assert viewer.editing.pending is None
         assert viewer.session.document.edits == (edit,)
         assert digest(viewer.shown) == expected
         assert viewer.state.history[-1]["line"] == edit.line()
@@ -97,7 +97,7 @@ def test_cancel_restores_the_model_and_the_knobs(name, folder):
         await let(viewer, op=edit.op)
         await let(viewer, **moved(name))
         assert viewer.state.edit_pending
-        await do(viewer, viewer.cancel_edit)
+        await do(viewer, viewer.editing.cancel)
         assert not viewer.state.edit_pending
         assert viewer.state.edit_note == ""
         assert digest(viewer.shown) == source
@@ -106,7 +106,7 @@ def test_cancel_restores_the_model_and_the_knobs(name, folder):
             if knob.kind not in ("file", "axis"):
                 assert viewer.state[knob.state] == knob.start
         # Nothing is being tried: what is there can be saved.
-        await do(viewer, viewer.save)
+        await do(viewer, viewer.saving.save)
         assert viewer.state.error_save == ""
 
     with_viewer(folder, use, "gold.bvb")
@@ -118,7 +118,7 @@ def test_after_an_edit_is_applied_no_other_is_tried_by_itself(folder):
             edit = edit_in(folder, name)
             await let(viewer, op=edit.op)
             await let(viewer, **moved(name))
-            await do(viewer, viewer.apply_edit)
+            await do(viewer, viewer.editing.apply)
             await asyncio.sleep(0)
             await viewer.settled()
             assert not viewer.state.edit_pending, name
@@ -162,12 +162,12 @@ def test_a_wrong_value_is_told_and_changes_nothing(name, folder):
         assert "unexpectedly" not in viewer.state.error_edit
         assert not viewer.state.edit_pending
         assert digest(viewer.shown) == source
-        await do(viewer, viewer.apply_edit)
+        await do(viewer, viewer.editing.apply)
         assert viewer.state.error_edit
         assert viewer.session.document.edits == ()
         assert viewer.state.edit_note == ""
         # The words go when what was wrong goes.
-        await do(viewer, viewer.cancel_edit)
+        await do(viewer, viewer.editing.cancel)
         assert viewer.state.error_edit == ""
 
     with_viewer(folder, use, "gold.bvb")
@@ -201,7 +201,7 @@ def test_without_live_nothing_is_shown_before_apply(folder):
         assert viewer.state.edit_pending
         await let(viewer, live=False)
         assert digest(viewer.shown) == source
-        await do(viewer, viewer.apply_edit)
+        await do(viewer, viewer.editing.apply)
         assert [edit.line() for edit in viewer.session.document.edits] == ["gain factor=3"]
 
     with_viewer(folder, use, "gold.bvb")

@@ -39,7 +39,7 @@ def folder(tmp_path):
 def test_the_panel_says_the_options(state, options, folder):
     async def use(viewer):
         await let(viewer, **state)
-        assert FitOptions(**viewer.fit_options()) == FitOptions(**options)
+        assert FitOptions(**viewer.fitting.options()) == FitOptions(**options)
 
     with_viewer(folder, use, "gold.bvb")
 
@@ -50,7 +50,7 @@ def test_a_measurement_is_fitted_and_the_model_compared_with_it(folder):
         viewer.state.change("fit_share")(lambda fit_share, **_: shares.append(fit_share))
         await let(viewer, **QUICK, fit_by="size", fit_size=[6, 5, 4])
         with no_errors(viewer):
-            await do(viewer, viewer.fit)
+            await do(viewer, viewer.fitting.fit)
         assert not viewer.state.fitting
         options = FitOptions(size=(6, 5, 4), chart="half-diff", encoding="root", knots="averaged")
         expected = options.fitted(load(folder / "table.npz"))
@@ -64,11 +64,11 @@ def test_a_measurement_is_fitted_and_the_model_compared_with_it(folder):
         assert viewer.state.can_fit_source
         # A new fit of the measurement is a document beside it, one of the model an edit.
         await let(viewer, fit_size=[5, 5, 4], fit_of="source")
-        await do(viewer, viewer.fit)
+        await do(viewer, viewer.fitting.fit)
         assert len(viewer.state.documents) == 2
         await let(viewer, fit_size=[4, 4, 4], fit_of="model")
         before = viewer.session.document.model
-        await do(viewer, viewer.fit)
+        await do(viewer, viewer.fitting.fit)
         edit = Fit(size=(4, 4, 4), chart="half-diff", encoding="root", knots="averaged")
         assert viewer.session.document.edits == (edit,)
         assert digest(viewer.shown) == digest(edit.apply(before))
@@ -80,11 +80,11 @@ def test_a_model_is_fitted_within_bytes_or_to_a_tolerance(folder):
     async def use(viewer):
         with no_errors(viewer):
             await let(viewer, **QUICK, fit_by="tolerance", fit_tolerance=0.05)
-            await do(viewer, viewer.fit)
+            await do(viewer, viewer.fitting.fit)
             report = viewer.shown.report["metrics"]
             assert max(report[k]["log_cosine_rms"] for k in ("grid", "nodes")) <= 0.05
             await let(viewer, fit_by="bytes", fit_kib=4)
-            await do(viewer, viewer.fit)
+            await do(viewer, viewer.fitting.fit)
         assert [edit.line().split()[1] for edit in viewer.session.document.edits] == ["chart=half-diff"] * 2
         save(viewer.shown, folder / "small.bvb", precision=viewer.shown.storage.precision)
         assert (folder / "small.bvb").stat().st_size <= 4096
@@ -96,12 +96,12 @@ def test_stop_leaves_the_document_and_a_later_fit_works(folder):
     async def use(viewer):
         before = viewer.session.document
         await let(viewer, **QUICK, fit_by="tolerance", fit_tolerance=1e-6)
-        fitting = asyncio.ensure_future(do(viewer, viewer.fit))
+        fitting = asyncio.ensure_future(do(viewer, viewer.fitting.fit))
         while not viewer.state.fitting:
             await asyncio.sleep(0.005)
         # Others are refused meanwhile, quietly: the button cannot be pressed.
-        await viewer.fit()
-        viewer.stop_fit()
+        await viewer.fitting.fit()
+        viewer.fitting.stop()
         await fitting
         assert viewer.state.error_fit == "Stopped. Nothing was changed."
         assert not viewer.state.fitting
@@ -109,7 +109,7 @@ def test_stop_leaves_the_document_and_a_later_fit_works(folder):
         assert viewer.state.fit_result == ""
         await let(viewer, fit_by="size", fit_size=[5, 5, 4])
         with no_errors(viewer):
-            await do(viewer, viewer.fit)
+            await do(viewer, viewer.fitting.fit)
         assert viewer.shown.spline.size == (5, 5, 4)
 
     with_viewer(folder, use, "gold.bvb")
@@ -118,17 +118,17 @@ def test_stop_leaves_the_document_and_a_later_fit_works(folder):
 def test_a_document_that_is_closed_or_edited_meanwhile_is_told(folder):
     async def use(viewer):
         await let(viewer, **QUICK, fit_by="size", fit_size=[5, 5, 4])
-        fitting = asyncio.ensure_future(do(viewer, viewer.fit))
+        fitting = asyncio.ensure_future(do(viewer, viewer.fitting.fit))
         while not viewer.state.fitting:
             await asyncio.sleep(0.005)
         await let(viewer, op="gain", knob_gain_factor=2.0)
-        await do(viewer, viewer.apply_edit)
+        await do(viewer, viewer.editing.apply)
         await fitting
         assert "changed meanwhile" in viewer.state.error_fit
         assert [edit.op for edit in viewer.session.document.edits] == ["gain"]
-        fitting = asyncio.ensure_future(do(viewer, viewer.fit))
+        fitting = asyncio.ensure_future(do(viewer, viewer.fitting.fit))
         await asyncio.sleep(0.05)
-        await do(viewer, viewer.close, discard=True)
+        await do(viewer, viewer.opening.close, discard=True)
         await fitting
         assert viewer.state.error_fit
         assert "unexpectedly" not in viewer.state.error_fit
@@ -161,7 +161,7 @@ def test_a_wrong_option_is_told_and_changes_nothing(state, folder):
     async def use(viewer):
         before = viewer.session.document
         await let(viewer, **state)
-        await do(viewer, viewer.fit)
+        await do(viewer, viewer.fitting.fit)
         assert viewer.state.error_fit
         assert "unexpectedly" not in viewer.state.error_fit
         assert not viewer.state.fitting
@@ -173,7 +173,7 @@ def test_a_wrong_option_is_told_and_changes_nothing(state, folder):
 
 def test_without_a_material_there_is_nothing_to_fit(folder):
     async def use(viewer):
-        await do(viewer, viewer.fit)
+        await do(viewer, viewer.fitting.fit)
         assert "Nothing is open" in viewer.state.error_fit
         assert not viewer.state.fitting
 

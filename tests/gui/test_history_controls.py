@@ -29,7 +29,7 @@ async def edited(viewer, *lines):
         told = edit.to_dict()
         op = told.pop("op")
         await let(viewer, op=op, **{f"knob_{op}_{name}": value for name, value in told.items()})
-        await do(viewer, viewer.apply_edit)
+        await do(viewer, viewer.editing.apply)
 
 
 def told(viewer):
@@ -44,13 +44,13 @@ def test_undo_redo_and_going_to_a_state_show_it(folder):
             digests.append(digest(viewer.shown))
         lines = ["as opened", *LINES]
         for method, position in (
-            ((viewer.undo,), 2),
-            ((viewer.undo,), 1),
-            ((viewer.redo,), 2),
-            ((viewer.go_to, 0), 0),
-            ((viewer.undo,), 0),
-            ((viewer.go_to, 3), 3),
-            ((viewer.redo,), 3),
+            ((viewer.editing.undo,), 2),
+            ((viewer.editing.undo,), 1),
+            ((viewer.editing.redo,), 2),
+            ((viewer.editing.go_to, 0), 0),
+            ((viewer.editing.undo,), 0),
+            ((viewer.editing.go_to, 3), 3),
+            ((viewer.editing.redo,), 3),
         ):
             await do(viewer, *method)
             assert digest(viewer.shown) == digests[position]
@@ -60,7 +60,7 @@ def test_undo_redo_and_going_to_a_state_show_it(folder):
             assert viewer.state.can_redo == (position < 3)
             assert viewer.state.error_edit == ""
         for nonsense in (4, -1, "first", None, 1.5, [], True):
-            await do(viewer, viewer.go_to, nonsense)
+            await do(viewer, viewer.editing.go_to, nonsense)
             assert "There is no state" in viewer.state.error_edit
             assert viewer.session.document.position == 3
 
@@ -73,7 +73,7 @@ def test_undo_first_takes_back_what_is_only_tried(folder):
         done = digest(viewer.shown)
         await let(viewer, op="gain", knob_gain_factor=7.0)
         assert digest(viewer.shown) != done
-        await do(viewer, viewer.undo)
+        await do(viewer, viewer.editing.undo)
         assert digest(viewer.shown) == done
         assert viewer.session.document.position == 1
         assert viewer.state.knob_gain_factor == 1.0
@@ -86,7 +86,7 @@ def test_what_is_tried_is_tried_on_the_state_that_is_gone_to(folder):
         await edited(viewer, LINES[0])
         source = viewer.session.document.at(0)
         await let(viewer, op="tint", knob_tint_rgb=[1.0, 0.5, 0.5])
-        await do(viewer, viewer.go_to, 0)
+        await do(viewer, viewer.editing.go_to, 0)
         assert viewer.state.edit_pending
         assert digest(viewer.shown) == digest(edit_of_line("tint rgb=1,0.5,0.5").apply(source))
 
@@ -96,7 +96,7 @@ def test_what_is_tried_is_tried_on_the_state_that_is_gone_to(folder):
 def test_an_edit_after_undo_ends_what_could_be_redone(folder):
     async def use(viewer):
         await edited(viewer, *LINES[:2])
-        await do(viewer, viewer.undo)
+        await do(viewer, viewer.editing.undo)
         await edited(viewer, LINES[2])
         assert [line for line, _ in told(viewer)] == ["as opened", LINES[0], LINES[2]]
         assert not viewer.state.can_redo
@@ -108,11 +108,11 @@ def test_a_state_gets_a_name(folder):
     async def use(viewer):
         await edited(viewer, LINES[0])
         await let(viewer, named="bright")
-        await do(viewer, viewer.name_state)
+        await do(viewer, viewer.editing.name_state)
         assert viewer.state.history[-1]["name"] == "bright"
         assert viewer.state.named == ""
         assert viewer.session.document.names == {"bright": 1}
-        await do(viewer, viewer.name_state)
+        await do(viewer, viewer.editing.name_state)
         assert "called nothing" in viewer.state.error_edit
 
     with_viewer(folder, use, "gold.bvb")
@@ -142,7 +142,7 @@ def test_each_document_keeps_its_own_history(folder):
         await let(viewer, current=names["gold.bvb"])
         assert [line for line, _ in told(viewer)] == ["as opened", *LINES[:2]]
         assert digest(viewer.shown) == gold
-        await do(viewer, viewer.undo)
+        await do(viewer, viewer.editing.undo)
         await let(viewer, current=names["dim.bvb"])
         assert told(viewer)[-1] == (LINES[2], True)
         for nonsense in (7, None, "1", [1], 1.0):
@@ -156,7 +156,7 @@ def test_the_recipe_makes_the_same_net_again(folder):
     async def use(viewer):
         await edited(viewer, *LINES)
         await let(viewer, op="blend", knob_blend_partner="dim.bvb", knob_blend_t=0.25)
-        await do(viewer, viewer.apply_edit)
+        await do(viewer, viewer.editing.apply)
         await do(viewer, viewer.show_dialog, "recipe")
         assert viewer.state.error_save == ""
         made = digest(viewer.shown)
@@ -168,10 +168,10 @@ def test_the_recipe_makes_the_same_net_again(folder):
 
         # And after it was saved and opened, with the steps of before and the rounding of the file.
         await let(viewer, save_name="looked.bvb", save_precision="float32")
-        await do(viewer, viewer.save_as)
+        await do(viewer, viewer.saving.save_as)
         assert viewer.state.error_save == ""
-        await do(viewer, viewer.close)
-        await do(viewer, viewer.open_file, "looked.bvb")
+        await do(viewer, viewer.opening.close)
+        await do(viewer, viewer.opening.open_file, "looked.bvb")
         assert [s["past"] for s in viewer.state.history] == [True] * 5 + [False]
         await edited(viewer, LINES[0])
         await do(viewer, viewer.show_dialog, "recipe")
@@ -185,7 +185,7 @@ def test_the_recipe_makes_the_same_net_again(folder):
 
 def test_there_is_no_recipe_of_a_measurement(folder):
     async def use(viewer):
-        await do(viewer, viewer.open_sample, "chrome")
+        await do(viewer, viewer.opening.open_sample, "chrome")
         await do(viewer, viewer.show_dialog, "recipe")
         assert "is a measurement" in viewer.state.error_save
 

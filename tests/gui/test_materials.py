@@ -53,7 +53,7 @@ def test_every_control_works_for_every_model(name, tmp_path):
                 pixels, width, height = area.img_cols_rows
                 assert pixels.shape == (height, width, 3)
             await let(viewer, op="gain", knob_gain_factor=2.0)
-            await do(viewer, viewer.apply_edit)
+            await do(viewer, viewer.editing.apply)
             assert [edit.line() for edit in viewer.session.document.edits] == ["gain factor=2"]
 
     with_viewer(tmp_path, use, "m.bvb")
@@ -99,19 +99,19 @@ def test_a_measurement_is_seen_and_what_needs_a_model_says_so(tmp_path):
         await let(viewer, show_net=True, show_knots=True, knob_gain_factor=2.0)
         assert mesh(viewer.volume, "net 0") is None
         assert mesh(viewer.volume, "knots 0") is None
-        assert viewer.pending is None
+        assert viewer.editing.pending is None
         for method, place in (
-            (viewer.apply_edit, "edit"),
-            (viewer.name_state, "edit"),
-            (viewer.save_as, "save"),
+            (viewer.editing.apply, "edit"),
+            (viewer.editing.name_state, "edit"),
+            (viewer.saving.save_as, "save"),
         ):
             await let(viewer, named="x", save_name="x.bvb")
             await do(viewer, method)
             assert "is a measurement. Fit it first." in viewer.state[f"error_{place}"]
         await let(viewer, fit_of="model")
-        await do(viewer, viewer.fit)
+        await do(viewer, viewer.fitting.fit)
         assert "is a measurement. Fit it first." in viewer.state.error_fit
-        for method in (viewer.undo, viewer.redo, viewer.cancel_edit):
+        for method in (viewer.editing.undo, viewer.editing.redo, viewer.editing.cancel):
             await do(viewer, method)
         assert list(tmp_path.iterdir()) == [tmp_path / "table.npz"]
 
@@ -120,9 +120,20 @@ def test_a_measurement_is_seen_and_what_needs_a_model_says_so(tmp_path):
 
 def test_without_a_material_nothing_fails(tmp_path):
     async def use(viewer):
-        for method in (viewer.undo, viewer.redo, viewer.cancel_edit, viewer.save, viewer.close, viewer.reset_region):
+        for method in (
+            viewer.editing.undo,
+            viewer.editing.redo,
+            viewer.editing.cancel,
+            viewer.saving.save,
+            viewer.opening.close,
+            viewer.editing.reset_region,
+        ):
             await do(viewer, method)
-        for method, place in ((viewer.apply_edit, "edit"), (viewer.save_as, "save"), (viewer.name_state, "edit")):
+        for method, place in (
+            (viewer.editing.apply, "edit"),
+            (viewer.saving.save_as, "save"),
+            (viewer.editing.name_state, "edit"),
+        ):
             await let(viewer, named="x", save_name="x.bvb")
             await do(viewer, method)
             assert "Nothing is open" in viewer.state[f"error_{place}"]

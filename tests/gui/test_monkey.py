@@ -69,8 +69,8 @@ async def used(viewer: Viewer, steps: Steps) -> list[float]:
             await fitted(viewer, stop=n == fits[1])
         document = viewer.document
         if document is not None and (points(document.model.spline) > LARGEST or len(document.edits) > 40):
-            await do(viewer, viewer.close, viewer.session.current, discard=True)
-            await do(viewer, viewer.open_file, "a.bvb")
+            await do(viewer, viewer.opening.close, viewer.session.current, discard=True)
+            await do(viewer, viewer.opening.open_file, "a.bvb")
         if n % (ACTIONS // 5) == ACTIONS // 5 - 1:
             await viewer.settled()
             gc.collect()
@@ -81,10 +81,10 @@ async def used(viewer: Viewer, steps: Steps) -> list[float]:
 async def fitted(viewer: Viewer, *, stop: bool) -> None:
     """Fit with a tiny size, or stop at once."""
     await let(viewer, fit_by="size", fit_size=[4, 4, 4], fit_chart="half-diff", fit_encoding="root", fit_of="model")
-    fitting = asyncio.ensure_future(do(viewer, viewer.fit))
+    fitting = asyncio.ensure_future(do(viewer, viewer.fitting.fit))
     if stop:
         await asyncio.sleep(0.05)
-        viewer.stop_fit()
+        viewer.fitting.stop()
     await fitting
 
 
@@ -119,14 +119,14 @@ def test_random_actions_leave_documents_that_can_be_replayed_and_saved(tmp_path,
             for seconds, what in steps.longest:
                 print(f"  {1000 * seconds:.0f} ms, {seconds / unit:.1f} pictures: {what}")
             print("MiB after each fifth:", ", ".join(f"{m:.0f}" for m in memory))
-        await do(viewer, viewer.cancel_edit)
+        await do(viewer, viewer.editing.cancel)
         for key, opened in viewer.session:
             if opened.document is None:
                 continue
             assert replayed(opened.document) == digest(opened.document.model)
             await let(viewer, current=key)
             await let(viewer, save_name=f"end-{key}.bvb", save_precision="float64", save_pdf=False)
-            await do(viewer, viewer.save_as, over=True)
+            await do(viewer, viewer.saving.save_as, over=True)
             assert viewer.state.error_save == ""
             assert digest(Document.open(folder / f"end-{key}.bvb").model) == digest(opened.document.model)
             app(["history", str(folder / f"end-{key}.bvb")], result_action="return_value")

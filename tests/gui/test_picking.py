@@ -67,7 +67,7 @@ def test_shift_adds_to_what_is_picked_and_the_region_spans_both(folder):
             np.testing.assert_allclose(viewer.state[f"region_{name}"], interval, atol=0.06)
         await click(viewer, net[a])
         assert "picked)" not in viewer.state.picked
-        await do(viewer, viewer.reset_region)
+        await do(viewer, viewer.editing.reset_region)
         assert viewer.state.picked == ""
         assert not viewer.state.region_theta_h_on
         assert len(points(viewer.volume, "marked")) == 0
@@ -123,9 +123,9 @@ def test_an_edit_is_confined_to_the_region(folder):
             await let(viewer, region_phi_d_on=True, region_phi_d=[0, 10], region_falloff=0)
             edit = edit_of_line("gain factor=2 theta_h=0..5 phi_d=0..10 falloff=0")
             assert digest(viewer.shown) == digest(edit.apply(source))
-            await do(viewer, viewer.apply_edit)
+            await do(viewer, viewer.editing.apply)
         assert viewer.session.document.edits == (edit,)
-        await do(viewer, viewer.reset_region)
+        await do(viewer, viewer.editing.reset_region)
         assert len(points(viewer.volume, "selected")) == 0
 
     with_viewer(folder, use, "gold.bvb")
@@ -196,7 +196,7 @@ def test_what_is_picked_is_forgotten_when_the_net_is_another(folder):
         assert viewer.state.picked
         await let(viewer, op="reduce", knob_reduce_axis=0)
         await let(viewer, knob_reduce_by=2)
-        await do(viewer, viewer.apply_edit)
+        await do(viewer, viewer.editing.apply)
         assert viewer.state.picked == ""
         assert len(points(viewer.volume, "marked")) == 0
 

@@ -121,17 +121,17 @@ def test_the_viewer_neither_reads_nor_writes_outside(tmp_path, name):
     name = name.format(out=outside)
 
     async def use(viewer):
-        for method in (viewer.open_file, viewer.recover, viewer.discard_kept):
+        for method in (viewer.opening.open_file, viewer.opening.recover, viewer.opening.discard_kept):
             viewer.state.error_open = ""
             await do(viewer, method, name)
             assert "outside" in viewer.state.error_open
         assert len(viewer.state.documents) == 1
         await let(viewer, save_name=name)
-        await do(viewer, viewer.save_as, over=True)
+        await do(viewer, viewer.saving.save_as, over=True)
         assert "outside" in viewer.state.error_save
         await let(viewer, op="blend", knob_blend_partner=name, knob_blend_t=0.5)
         assert "outside" in viewer.state.error_edit
-        await do(viewer, viewer.apply_edit)
+        await do(viewer, viewer.editing.apply)
         assert viewer.session.document.edits == ()
         for scene in (name, name.replace(".bvb", ".toml")):
             await let(viewer, scene=scene)
@@ -154,10 +154,10 @@ def test_what_was_kept_is_neither_read_through_a_link_nor_written_through_it(tmp
 
     async def use(viewer):
         assert viewer.state.kept_files == []
-        await do(viewer, viewer.recover, "lost.bvb")
+        await do(viewer, viewer.opening.recover, "lost.bvb")
         assert "link to elsewhere" in viewer.state.error_open
         await let(viewer, op="gain", knob_gain_factor=2.0)
-        await do(viewer, viewer.apply_edit)
+        await do(viewer, viewer.editing.apply)
 
     with_viewer(folder, use, "gold.bvb")
     assert contents(outside) == before

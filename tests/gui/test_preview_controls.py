@@ -133,7 +133,7 @@ def test_what_it_is_compared_with_is_what_is_chosen(folder):
         # With what it is compared with, the comparison goes.
         await let(viewer, against="document 2")
         viewer.session.current = 2
-        viewer.close(2)
+        viewer.opening.close(2)
         await viewer.settled()
         assert viewer.state.against == "nothing"
         assert viewer.other is None

@@ -26,7 +26,7 @@ def folder(tmp_path):
 async def brighter(viewer, factor):
     await let(viewer, op="gain")
     await let(viewer, knob_gain_factor=factor)
-    await do(viewer, viewer.apply_edit)
+    await do(viewer, viewer.editing.apply)
 
 
 def offered(folder):
@@ -39,24 +39,24 @@ def test_a_new_session_offers_what_was_not_saved(folder):
     async def crash(viewer):
         await brighter(viewer, 2.0)
         await brighter(viewer, 3.0)
-        await do(viewer, viewer.undo)
+        await do(viewer, viewer.editing.undo)
         found.append(digest(viewer.session.here.model))
 
     async def again(viewer):
         assert viewer.state.kept_files == ["gold.bvb"]
-        await do(viewer, viewer.recover, "gold.bvb")
+        await do(viewer, viewer.opening.recover, "gold.bvb")
         assert viewer.state.error_open == ""
         document = viewer.session.document
         assert digest(document.model) == found[0]
         assert [edit.line() for edit in document.edits] == ["gain factor=2", "gain factor=3"]
         assert document.position == 1
         assert viewer.state.unsaved
-        await do(viewer, viewer.undo)
+        await do(viewer, viewer.editing.undo)
         assert viewer.session.document.position == 0
         # What is open is not offered once more.
         await do(viewer, viewer.show_dialog, "open")
         assert viewer.state.kept_files == []
-        await do(viewer, viewer.close, discard=True)
+        await do(viewer, viewer.opening.close, discard=True)
         assert offered(folder) == []
 
     with_viewer(folder, crash, "gold.bvb")
@@ -83,7 +83,7 @@ def test_what_was_discarded_is_not_offered(folder):
         await brighter(viewer, 2.0)
 
     async def again(viewer):
-        await do(viewer, viewer.discard_kept, "gold.bvb")
+        await do(viewer, viewer.opening.discard_kept, "gold.bvb")
         assert viewer.state.kept_files == []
 
     with_viewer(folder, crash, "gold.bvb")
@@ -96,10 +96,10 @@ def test_damage_is_told(folder):
 
     async def use(viewer):
         assert viewer.state.kept_files == ["gold.bvb"]
-        await do(viewer, viewer.recover, "gold.bvb")
+        await do(viewer, viewer.opening.recover, "gold.bvb")
         assert viewer.state.error_open
         assert viewer.session.current is None
-        await do(viewer, viewer.recover, "other.bvb")
+        await do(viewer, viewer.opening.recover, "other.bvb")
         assert "Nothing was kept" in viewer.state.error_open
 
     with_viewer(folder, use)
@@ -188,7 +188,7 @@ def test_what_is_in_folders_below_is_offered(folder):
 
     async def use(viewer):
         assert viewer.state.kept_files == ["below/deep.bvb"]
-        await do(viewer, viewer.recover, "below/deep.bvb")
+        await do(viewer, viewer.opening.recover, "below/deep.bvb")
         assert viewer.session.document.edits[-1].line() == "gain factor=2"
 
     with_viewer(folder, use)
@@ -216,11 +216,11 @@ def test_what_was_kept_of_a_file_that_is_open_does_not_open_it_twice(folder):
     session.keep()
 
     async def use(viewer):
-        await do(viewer, viewer.recover, "gold.bvb")
+        await do(viewer, viewer.opening.recover, "gold.bvb")
         assert "is open" in viewer.state.error_open
         assert len(viewer.state.documents) == 1
-        await do(viewer, viewer.close)
-        await do(viewer, viewer.recover, "gold.bvb")
+        await do(viewer, viewer.opening.close)
+        await do(viewer, viewer.opening.recover, "gold.bvb")
         assert viewer.session.document.edits[-1].line() == "gain factor=2"
 
     with_viewer(folder, use, "gold.bvb")

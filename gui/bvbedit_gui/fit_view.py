@@ -1,0 +1,119 @@
+"""The panel of fits: a measurement, or the present model anew, in a process that can be stopped."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from bvbedit.edit.document import Document
+from bvbedit.edit.fitting import Fit, FitOptions
+from bvbedit.errors import BvbError
+from bvbedit_gui import tasks
+from bvbedit_gui.session import Opened
+from bvbedit_gui.words import of_fit
+from bvbedit_gui.worker import Stopped, Worker
+
+if TYPE_CHECKING:
+    from bvbedit_gui.viewer import Viewer
+
+STARTS: dict[str, Any] = {
+    "fit_of": "model",
+    "fit_chart": "auto",
+    "fit_encoding": "auto",
+    "fit_by": "bytes",
+    "fit_kib": 16,
+    "fit_tolerance": 0.01,
+    "fit_size": [16, 12, 10],
+    "fit_knots": "dominant",
+    "fit_share": 0.0,
+    "fitting": False,
+    "fit_result": "",
+    "can_fit_source": False,
+}
+
+
+class FitView:
+    """Fits with the options in the panel."""
+
+    def __init__(self, viewer: "Viewer") -> None:
+        self._viewer = viewer
+        self.state = viewer.state
+        self.state.update(STARTS)
+        self.worker = Worker()
+
+    def synchronise(self, here: Opened | None) -> None:
+        """Offer what can be fitted."""
+        self.state.can_fit_source = here is not None and here.measurement is not None
+        if not self.state.can_fit_source:
+            self.state.fit_of = "model"
+
+    def options(self) -> dict[str, Any]:
+        """Return the options in the panel. Raises BvbError for numbers that are none."""
+        state = self.state
+        options: dict[str, Any] = {
+            "chart": state.fit_chart,
+            "encoding": state.fit_encoding,
+            "knots": state.fit_knots,
+        }
+        try:
+            if state.fit_by == "bytes":
+                options["max_bytes"] = round(1024 * float(state.fit_kib))
+            elif state.fit_by == "tolerance":
+                options["tolerance"] = float(state.fit_tolerance)
+            elif state.fit_by == "size":
+                options["size"] = tuple(int(n) for n in state.fit_size)
+            elif state.fit_by != "knee":
+                raise BvbError("Choose by what the size of the fit is found: bytes, tolerance, size or by itself.")
+        except (TypeError, ValueError, OverflowError):
+            raise BvbError("A field of the fit is no number. Fill it in.") from None
+        return options
+
+    async def fit(self) -> None:
+        """Fit the measurement, or the present model anew, in another process."""
+        state = self.state
+        if self.worker.busy:
+            return
+        with self._viewer.telling("fit"):
+            here = self._viewer.session.here
+            key = self._viewer.session.current
+            options = self.options()
+            state.update({"fitting": True, "fit_share": 0.0, "fit_result": ""})
+            state.flush()
+            if state.fit_of == "source":
+                await self._fit_measurement(here, key, FitOptions(**options))
+            else:
+                document = here.known_document
+                edit = Fit(**options)
+                model = await self.worker.run(tasks.refitted, document.model, edit, progress=self._progress)
+                await self._viewer.editing.do(document, edit, model)
+            state.fit_result = of_fit(self._viewer.session.here.model)
+        state.fitting = False
+
+    async def _fit_measurement(self, here: Opened, key: int | None, options: FitOptions) -> None:
+        if here.measurement is None:
+            raise BvbError("There is no measurement to fit. Open one, or fit the present model.")
+        model = await self.worker.run(tasks.fitted, here.measurement, options, progress=self._progress)
+        document = Document.of_fit(model, options, **here.measurement.told())
+        fitted = Opened(
+            f"{Path(here.name).stem}.bvb",
+            document,
+            reference=here.reference,
+            reference_name=here.reference_name,
+            measurement=here.measurement,
+        )
+        if key is None or key not in self._viewer.session:
+            raise Stopped("It was closed meanwhile.")
+        if here.document is None:
+            # The measurement stays as what the model is compared with.
+            self._viewer.session.put(fitted, key)
+            self._viewer.session.current = key
+        else:
+            self._viewer.session.add(fitted)
+        self._viewer.arrived()
+        self.state.tab = "fit"
+
+    def _progress(self, share: float) -> None:
+        with self.state:
+            self.state.fit_share = round(100 * share)
+
+    def stop(self) -> None:
+        """Stop the fit."""
+        self.worker.close()
