@@ -1,7 +1,6 @@
 """Two thousand random actions leave the viewer working and every document replayable."""
 
 import asyncio
-import gc
 from pathlib import Path
 
 import numpy as np
@@ -23,8 +22,10 @@ ACTIONS, SEED = 2000, 20081111
 SETTLE = 20
 # Larger models make every step slow, and are no other case.
 LARGEST = 4000
-# A step of the loop may take so many times what one picture of the volume takes.
-LONGEST_STEP = 10
+# A step of the loop may take so many times what one picture of the volume takes that has come to rest.
+LONGEST_STEP = 20
+# Memory may grow by so much over the last three fifths: kernels and scenes are made in the first two.
+GROWTH = 1.25
 
 
 def folder_of(tmp_path: Path) -> Path:
@@ -73,7 +74,6 @@ async def used(viewer: Viewer, steps: Steps) -> list[float]:
             await do(viewer, viewer.opening.open_file, "a.bvb")
         if n % (ACTIONS // 5) == ACTIONS // 5 - 1:
             await viewer.settled()
-            gc.collect()
             memory.append(resident())
     return memory
 
@@ -105,7 +105,6 @@ def test_random_actions_leave_documents_that_can_be_replayed_and_saved(tmp_path,
         picture = []
         for _ in range(5):
             with steps_measured() as one:
-                viewer.volume.area.moved()
                 asyncio.get_running_loop().call_soon(lambda: viewer.volume.area.img_cols_rows)
                 await asyncio.sleep(0.01)
             picture.append(one.longest[0][0])
@@ -135,4 +134,4 @@ def test_random_actions_leave_documents_that_can_be_replayed_and_saved(tmp_path,
     with_viewer(folder, use, "a.bvb", "m.npz", "b.bvb")
     assert {path.name for path in tmp_path.iterdir()} == {"folder", "outside.bvb"}
     assert max(largest) < LONGEST_STEP
-    assert memory[-1] < 2 * memory[0]
+    assert memory[-1] < GROWTH * memory[1]
