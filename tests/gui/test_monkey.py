@@ -24,8 +24,8 @@ SETTLE = 20
 LARGEST = 4000
 # A step of the loop may take so many times what one picture of the volume takes that has come to rest.
 LONGEST_STEP = 20
-# Memory may grow by so much over the last three fifths: kernels and scenes are made in the first two.
-GROWTH = 1.25
+# Memory may grow by so much over the last three fifths: a kernel or a scene may be made for the first time there.
+GROWTH = 1.5
 
 
 def folder_of(tmp_path: Path) -> Path:
