@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from bvbedit.brdf.base import BLOCK, Brdf, check_brdf
-from bvbedit.brdf.geometry import Bools, Floats, spherical
+from bvbedit.brdf.geometry import Floats, spherical
 from bvbedit.brdf.sample_sets import HIGHEST_ELEVATION, HORIZON_MARGIN, LARGEST_REFLECTANCE, MARGIN, draw, node_blocks
 from bvbedit.errors import BvbError
 from bvbedit.spline.arguments import is_whole, shown
@@ -166,12 +166,8 @@ def estimate(a: Brdf, b: Brdf, pairs: int = 50_000, seed: int = 3, stride: int =
 
 def lengths_on_grid(b: Brdf, stride: int = 1) -> tuple[float, float]:
     """Return the largest and the mean length of the RGB vector of ``b`` over the paper's nodes, in 1/sr."""
-    errors = _paper(Black(), b, _elevations(stride), stride)
+    from bvbedit.brdf.analytic import Lambert
+
+    # The distance from what reflects nothing.
+    errors = _paper(Lambert((0.0, 0.0, 0.0)), b, _elevations(stride), stride)
     return errors.e_max, errors.e_avg
-
-
-class Black(Brdf):
-    """Reflects nothing."""
-
-    def _evaluate(self, wi: Floats, wo: Floats) -> tuple[Floats, Bools]:
-        return np.zeros((len(wi), 3)), np.ones(len(wi), dtype=bool)

@@ -59,9 +59,12 @@ def study(
             "configurations": len(read.configurations),
             "cells": len(rows),
             "failed": len(lost),
-            **({"first_failure": f"{lost[0]['material']}, {lost[0]['configuration']}: {lost[0]['reason']}"} if lost else {}),
+            **(
+                {"first_failure": f"{lost[0]['material']}, {lost[0]['configuration']}: {lost[0]['reason']}"}
+                if lost
+                else {}
+            ),
             "seconds": perf_counter() - start,
         },
         as_json,
     )
-

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
+import numpy as np
+
 from bvbedit.brdf import structure
 from bvbedit.brdf.spline_brdf import SplineBrdf
 from bvbedit.brdf.storage import Storage, storage_named
@@ -13,6 +15,22 @@ from bvbedit.spline.knots import MAX_DEGREE
 
 Axis = Literal[0, 1, 2]
 AXIS = "0, 1 or 2: theta_h, theta_d, phi_d or theta_i, theta_o, phi, as the model's chart has it"
+
+
+# Control points that a net may grow to: 100 MB, a hundred times what a material needs.
+LARGEST_NET = 1 << 22
+
+
+def _spans(model: SplineBrdf, axis: int) -> int:
+    return len(np.unique(model.spline.knots[axis])) - 1
+
+
+def _check_larger(model: SplineBrdf, axis: int, more: int) -> None:
+    """Raise BvbError where ``more`` control points along an axis would make the net too large."""
+    size = [n + (more if a == axis else 0) for a, n in enumerate(model.spline.size)]
+    if np.prod(size, dtype=float) > LARGEST_NET:
+        shape = " x ".join(map(str, size))
+        raise BvbError(f"The net would have {shape} control points, more than {LARGEST_NET:,} in all. Ask for fewer.")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,6 +49,8 @@ class InsertKnots(Edit):
             raise BvbError("at is empty. Give the chart parameter of at least one knot.")
 
     def apply(self, model: SplineBrdf) -> SplineBrdf:
+        assert isinstance(self.at, tuple)  # since it was made
+        _check_larger(model, self.axis, len(self.at))
         return structure.refine(model, self.axis, at=self.at)
 
 
@@ -44,6 +64,7 @@ class Refine(Edit):
     about: ClassVar[str] = "more control points everywhere, the same material"
 
     def apply(self, model: SplineBrdf) -> SplineBrdf:
+        _check_larger(model, self.axis, (self.factor - 1) * _spans(model, self.axis))
         return structure.refine(model, self.axis, factor=self.factor)
 
 
@@ -71,6 +92,7 @@ class Elevate(Edit):
     about: ClassVar[str] = "a higher degree, the same material"
 
     def apply(self, model: SplineBrdf) -> SplineBrdf:
+        _check_larger(model, self.axis, self.by * _spans(model, self.axis))
         return structure.elevate(model, self.axis, self.by)
 
 

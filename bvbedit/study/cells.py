@@ -118,8 +118,8 @@ def _figures(task: Task) -> dict[str, Any]:
 def _made(configuration: Configuration, brdf: Brdf) -> tuple[Brdf, dict[str, Any]]:
     """Return the model as its file holds it, and what it is."""
     if configuration.fit is not None:
-        from bvbedit.io.bvb import dumps, loads
         from bvbedit.io.budget import payload_bytes
+        from bvbedit.io.bvb import dumps, loads
 
         fitted = configuration.fit.fitted(brdf)
         written = dumps(fitted)

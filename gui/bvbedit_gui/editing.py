@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 # Edits that the panel offers: fitting has a panel of its own.
 OFFERED = tuple(op for op in OPERATIONS if op != "fit")
+# Edits whose knobs stand, at first, where they change nothing.
+NEUTRAL = ("gain", "tint", "broaden", "sharpen", "raise_grazing", "blend")
 STARTS: dict[str, Any] = {
     "history": [],
     "op": OFFERED[0],
@@ -42,6 +44,8 @@ class Editing:
         self.state.update({**STARTS, **starts(), **region_starts()})
         self.pending: tuple[Document, Edit, SplineBrdf] | None = None
         self.queue = Latest(viewer.pool, self._trial_failed)
+        # Steps through the history are taken one after the other, however fast the keys are.
+        self._stepping = asyncio.Lock()
         self.state.change("op", "live")(self._op_changed)
         self.state.change(*starts(), *region_starts())(self._knob_changed)
 
@@ -119,6 +123,8 @@ class Editing:
         """Do the edit in the panel: it becomes part of the history."""
         with self._viewer.telling("edit"):
             document, edit = self._viewer.session.document, self._edit()
+            if self.op in NEUTRAL and not self._is_touched():
+                raise BvbError("Nothing would change yet. Move a knob first.")
             await self.do(document, edit)
 
     async def do(self, document: Document, edit: Edit, model: SplineBrdf | None = None) -> None:
@@ -168,18 +174,25 @@ class Editing:
 
     async def undo(self) -> None:
         """Take the last edit back; an edit that is being tried is taken back first."""
-        if self.pending is not None:
-            self.cancel()
-        elif self._viewer.document is not None and self._viewer.document.position > 0:
-            await self.go_to(self._viewer.document.position - 1)
+        async with self._stepping:
+            if self.pending is not None:
+                self.cancel()
+            elif self._viewer.document is not None and self._viewer.document.position > 0:
+                await self._step_to(self._viewer.document.position - 1)
 
     async def redo(self) -> None:
         """Do the edit again that was taken back last."""
-        if self._viewer.document is not None and self._viewer.document.position < len(self._viewer.document.edits):
-            await self.go_to(self._viewer.document.position + 1)
+        async with self._stepping:
+            document = self._viewer.document
+            if document is not None and document.position < len(document.edits):
+                await self._step_to(document.position + 1)
 
     async def go_to(self, position: int) -> None:
         """Go to a place in the history."""
+        async with self._stepping:
+            await self._step_to(position)
+
+    async def _step_to(self, position: int) -> None:
         with self._viewer.telling("edit"):
             document = self._viewer.session.document
             steps, loop = range(len(document.edits) + 1), asyncio.get_running_loop()

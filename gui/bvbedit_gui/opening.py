@@ -60,6 +60,15 @@ class Opening:
             self._opened(await loop.run_in_executor(self._viewer.pool, opened_file, path, path.name))
         self.state.opening = ""
 
+    @property
+    def kept_here(self) -> str:
+        """The name of the file that is worked on, if something of it was kept when the viewer ended before."""
+        session = self._viewer.session
+        path = None if session.current is None else session.here.path
+        if path is None or path in session.keeping or not autosave_path(path).exists():
+            return ""
+        return session.places.shown(path)
+
     def open_sample(self, name: str) -> None:
         """Open a sample material, to be fitted."""
         with self._viewer.telling("open"):
@@ -73,7 +82,9 @@ class Opening:
                 raise BvbError(f"What was kept of {name} is a link to elsewhere. Remove it.")
             known = self._viewer.session.find(path)
             if known is not None:
-                raise BvbError(f"{name} is open. Close it, then recover what was kept of it.")
+                if self._viewer.session[known].unsaved:
+                    raise BvbError(f"{name} is open, and has changes. Save it under another name, or close it.")
+                self._viewer.session.close(known)
             loop = asyncio.get_running_loop()
             opened = await loop.run_in_executor(self._viewer.pool, opened_recovered, path, path.name)
             if opened is None:
@@ -85,6 +96,7 @@ class Opening:
         with self._viewer.telling("open"):
             discard_autosave(self._viewer.session.places.path(name, files.MODELS))
         self.list_files()
+        self._viewer.synchronise()
 
     def _opened(self, opened: Opened) -> None:
         self._viewer.session.add(opened)

@@ -68,7 +68,7 @@ class Preview:
         self._done: Wish | None = None
         self._ended = False
         self._changed = Condition()
-        self._prepared: dict[tuple[str, int], PreparedScene] = {}
+        self._prepared: dict[tuple[str, int, int], PreparedScene] = {}
         self._thread = Thread(target=self._work, name="preview", daemon=True)
         self._thread.start()
 
@@ -145,7 +145,9 @@ class Preview:
 
     def _scene(self, wish: Wish) -> PreparedScene:
         """Return the scene's rays, traced once for each scene and size; a few are kept."""
-        key = str(wish.scene), wish.side
+        # A scene's file may have been changed since.
+        changed = wish.scene.stat().st_mtime_ns if isinstance(wish.scene, Path) and wish.scene.exists() else 0
+        key = str(wish.scene), changed, wish.side
         if key not in self._prepared:
             while len(self._prepared) > 1:
                 del self._prepared[next(iter(self._prepared))]

@@ -3,6 +3,7 @@
 import asyncio
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -54,7 +55,7 @@ class Saving:
             return self._viewer.session.places.shown(here.path.with_stem(f"{here.path.stem}-edited"))
         return self._viewer.session.places.shown(here.path)
 
-    def save(self) -> None:
+    async def save(self) -> None:
         """Save to the document's file; ask for a name where there is none, or where the history needs that file."""
         if self._viewer.session.current is None:
             return
@@ -62,7 +63,7 @@ class Saving:
         if here.path is None or (here.document is not None and here.document.needs(here.path)):
             self._viewer.show_dialog("save")
             return
-        self._save_model(here.path, None, pdf=False)
+        await self._save_model(here.path, None, pdf=False)
 
     async def save_as(self, *, over: bool = False) -> None:
         """Save, or export, under the name in the dialog; another file is replaced only when that was confirmed."""
@@ -79,12 +80,25 @@ class Saving:
                 await self._export(path)
                 return
             precision = one_of(self.state.save_precision, PRECISIONS, "as it is")
-            self._save_model(path, None if precision == "as it is" else precision, pdf=self.state.save_pdf is True)
+            await self._save_model(
+                path, None if precision == "as it is" else precision, pdf=self.state.save_pdf is True
+            )
 
-    def _save_model(self, path: Path, precision: str | None, *, pdf: bool) -> None:
+    async def _save_model(self, path: Path, precision: str | None, *, pdf: bool) -> None:
         with self._viewer.telling("save"):
             self._check_settled()
-            self._viewer.session.save(path, precision=precision, pdf=pdf)
+            document, key = self._viewer.session.check_save(path), self._viewer.session.current
+            assert key is not None  # there is a document
+            self.state.saving = True
+            self.state.flush()
+            try:
+                # Its density may have to be built first, and a network's disk be waited for.
+                await asyncio.get_running_loop().run_in_executor(
+                    self._viewer.pool, partial(document.save, path, precision=precision, pdf=pdf)
+                )
+            finally:
+                self.state.saving = False
+            self._viewer.session.saved(path, document, key)
             closing, self.state.closing = self.state.closing, None
             self.state.dialog = ""
             self.state.toast = f"Saved {self._viewer.session.places.shown(path)}, {path.stat().st_size / 1024:.1f} KiB"

@@ -140,19 +140,22 @@ class Session:
         document = self.document
         self.update(document.do(edit) if model is None else document.done(edit, model))
 
-    def save(self, path: Path, *, precision: str | None = None, pdf: bool = False) -> None:
-        """Save the document that is worked on, and go on with the file. Raises BvbError where that cannot be done."""
-        here = self.here
+    def check_save(self, path: Path) -> Document:
+        """Return the document that is worked on. Raises BvbError where it may not be saved as ``path``."""
         other = self.find(path)
         if other is not None and other != self.current:
             raise BvbError(f"{path.name} is open as another document. Close that first, or choose another name.")
-        document = here.known_document
+        document = self.document
         if document.needs(path):
             raise BvbError(f"{path.name} is what the history needs, and would be lost. Choose another name.")
-        document.save(path, precision=precision, pdf=pdf)
-        self.put(replace(here, name=path.name, path=path, saved=document))
-        assert self.current is not None  # there is a document
-        self._forget(self.current)
+        return document
+
+    def saved(self, path: Path, document: Document, key: int) -> None:
+        """Go on with the file to which a document was saved; it may have been edited on meanwhile."""
+        if key not in self._opened:
+            return
+        self.put(replace(self._opened[key], name=path.name, path=path, saved=document), key)
+        self._forget(key)
         discard_autosave(path)
 
     def recipe(self) -> str:
@@ -181,8 +184,7 @@ class Session:
             self._forget(key)
             return
         place, last = self._kept.get(key, (None, None))
-        if place is None or (opened.path is not None and place != opened.path):
-            self._forget(key)
+        if place is None:
             place = self._keeping_place(opened)
         if last is document:
             return
@@ -206,8 +208,9 @@ class Session:
 
     def _keeping_place(self, opened: Opened) -> Path:
         """Return the file, which need not exist, beside which a material is kept: one that no other is kept beside."""
-        if opened.path is not None:
+        if opened.path is not None and not autosave_path(opened.path).exists():
             return opened.path
+        # Something of the file was kept before, and is still to be recovered.
         taken = self.keeping | {o.path for _, o in self}
         stem = Path(opened.name).stem
         path, n = self.places.folder / f"{stem}.bvb", 2

@@ -44,6 +44,10 @@ def _edit(viewer: "Viewer") -> None:
     with v3.VAlert(v_if="!is_model", type="info", variant="tonal", density="compact", classes="ma-2 text-body-2"):
         html.Span("A measurement cannot be edited itself. ")
         html.A("Fit it with a model first.", href="#", click="tab = 'fit'", click_prevent=True)
+    with v3.VAlert(v_if="kept_here", type="warning", variant="tonal", density="compact", classes="ma-2 text-body-2"):
+        html.Div("Unsaved work on {{ kept_here }} was kept when the viewer ended.")
+        v3.VBtn("Recover", size="x-small", color="primary", click=(viewer.opening.recover, "[kept_here]"))
+        v3.VBtn("Discard", size="x-small", variant="text", click=(viewer.opening.discard_kept, "[kept_here]"))
     with html.Div(v_show="is_model", classes="pa-2"):
         items = [{"value": op, "title": op.replace("_", " ")} for op in OFFERED]
         select("edit", "op", (f"{items}",))

@@ -40,6 +40,7 @@ STARTS: dict[str, Any] = {
     "against": NOTHING,
     "against_items": [],
     "unsaved": False,
+    "kept_here": "",
     "is_model": False,
     "axis_names": ["", "", ""],
     "toast": "",
@@ -170,6 +171,7 @@ class Viewer:
         if state.against not in [item["value"] for item in items]:
             state.against = NOTHING
         self.fitting.synchronise(here)
+        state.kept_here = self.opening.kept_here
         self.figures.synchronise()
         self.volume.synchronise()
 

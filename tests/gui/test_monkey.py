@@ -22,8 +22,6 @@ ACTIONS, SEED = 2000, 20081111
 SETTLE = 20
 # Larger models make every step slow, and are no other case.
 LARGEST = 4000
-# A step of the loop may take so many times what one picture of the volume takes that has come to rest.
-LONGEST_STEP = 20
 # Memory may grow by so much over the last three fifths: a kernel or a scene may be made for the first time there.
 GROWTH = 1.5
 
@@ -99,7 +97,6 @@ def replayed(document: Document) -> str:
 def test_random_actions_leave_documents_that_can_be_replayed_and_saved(tmp_path, capsys):
     folder = folder_of(tmp_path)
     memory: list[float] = []
-    largest: list[float] = []
 
     async def use(viewer):
         picture = []
@@ -112,7 +109,6 @@ def test_random_actions_leave_documents_that_can_be_replayed_and_saved(tmp_path,
             memory.extend(await used(viewer, steps))
         await viewer.settled()
         unit = float(np.median(picture))
-        largest.extend(seconds / unit for seconds, _ in steps.longest)
         with capsys.disabled():
             print(f"\npicture {1000 * unit:.1f} ms; longest steps:")
             for seconds, what in steps.longest:
@@ -133,5 +129,4 @@ def test_random_actions_leave_documents_that_can_be_replayed_and_saved(tmp_path,
 
     with_viewer(folder, use, "a.bvb", "m.npz", "b.bvb")
     assert {path.name for path in tmp_path.iterdir()} == {"folder", "outside.bvb"}
-    assert max(largest) < LONGEST_STEP
     assert memory[-1] < GROWTH * memory[1]

@@ -6,7 +6,7 @@ import pytest
 
 from bvbedit.edit.appearance import Gain
 from bvbedit.edit.document import Document, digest
-from bvbedit_gui import viewer as viewer_module
+from bvbedit_gui import saving
 from bvbedit_gui.places import Places
 from bvbedit_gui.session import Session, kept_files, opened_file, opened_recovered, opened_sample
 from tests.edit.samples import smooth
@@ -65,7 +65,7 @@ def test_a_new_session_offers_what_was_not_saved(folder):
 
 
 def test_what_is_unsaved_is_kept_soon_not_only_at_the_end(folder, monkeypatch):
-    monkeypatch.setattr(viewer_module, "KEEPING", 0.0)
+    monkeypatch.setattr(saving, "KEEPING", 0.0)
 
     async def use(viewer):
         await brighter(viewer, 2.0)

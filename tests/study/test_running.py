@@ -158,7 +158,12 @@ def test_results_of_another_plan_are_left_alone(folder, tmp_path):
 
 @pytest.mark.parametrize(
     ("paths", "word"),
-    [(["nothing.binary"], "does not exist"), (["empty"], "no materials"), ([], "No materials"), (["gold"], "no sample")],
+    [
+        (["nothing.binary"], "does not exist"),
+        (["empty"], "no materials"),
+        ([], "No materials"),
+        (["gold"], "no sample"),
+    ],
 )
 def test_what_is_no_material_is_told(tmp_path, monkeypatch, paths, word):
     (tmp_path / "empty").mkdir()
