@@ -31,6 +31,7 @@ app.command("bvbedit.cli.structure:blend", help="Mix two materials.")
 app.command("bvbedit.cli.pictures:render", help="Render pictures.")
 app.command("bvbedit.cli.pictures:view", help="Open the viewer, to look and to edit; or draw a picture.")
 app.command("bvbedit.cli.samples:sample_app", name="sample", help="Sample materials, to start without a measurement.")
+app.command("bvbedit.cli.study_report:recommend", help="Tell which configuration to use, by a study.")
 app.command("bvbedit.cli.demo:demo", help="The whole job on a sample made on the spot.")
 
 
