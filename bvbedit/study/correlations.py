@@ -91,8 +91,12 @@ def _matrix_plot(rows: Sequence[Row], scene: str, title: str) -> Plot:
         figure, (at,) = panels(1, 1, 3.1, width=3.7)
         # Vermilion through white to blue, which no common colour blindness mixes up.
         colours = LinearSegmentedColormap.from_list("correlation", (PALETTE[3], "white", PALETTE[0]))
-        shown = at.imshow(matrix, cmap=colours, vmin=-1, vmax=1)
+        # A mesh, not an image: the page and the SVG hold no pixels.
+        edges = np.arange(len(named) + 1) - 0.5
         at.grid(False)
+        at.pcolormesh(edges, edges, matrix, cmap=colours, vmin=-1, vmax=1, edgecolors="white", linewidth=0.5)
+        at.set_aspect("equal")
+        at.invert_yaxis()
         at.set_xticks(range(len(named)), list(named))
         at.set_yticks(range(len(named)), list(named))
         at.tick_params(length=0)
@@ -101,8 +105,6 @@ def _matrix_plot(rows: Sequence[Row], scene: str, title: str) -> Plot:
                 colour = "white" if abs(r) > 0.75 else "black"
                 text = "–" if np.isnan(r) else f"{r:.2f}".replace("-", "−")
                 at.text(j, i, text, ha="center", va="center", color=colour, fontsize=8)
-        bar = figure.colorbar(shown, ax=at, shrink=0.9)
-        bar.set_label("correlation")
         return figure
 
     lines = [

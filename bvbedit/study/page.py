@@ -10,7 +10,7 @@ CSS = """
 body { font: 16px/1.5 "DejaVu Sans", Verdana, sans-serif; color: #111; background: #fff; max-width: 62rem;
        margin: 2rem auto; padding: 0 1rem; }
 h1 { font-size: 1.6rem; } h2 { font-size: 1.25rem; margin-top: 2.5rem; border-bottom: 1px solid #bbb; }
-nav ol { columns: 2; column-gap: 2rem; font-size: .85rem; padding-left: 1.5rem; } a { color: #0072b2; }
+nav ul { columns: 2; column-gap: 2rem; font-size: .85rem; padding: 0; list-style: none; } a { color: #0072b2; }
 figure { margin: 2rem 0; break-inside: avoid; } figure svg { display: block; height: auto; margin: 0 auto; }
 figcaption { font-size: .9rem; margin-top: .5rem; } figcaption b { display: block; }
 details { margin: .5rem 0; font-size: .8rem; } summary { cursor: pointer; color: #0072b2; }
@@ -24,15 +24,15 @@ pre { font-size: .8rem; background: #f5f5f5; padding: .8rem; overflow-x: auto; }
 
 
 def number_text(value: Cell) -> str:
-    """Return ``value`` as a cell of a table: whole numbers with commas, others with four digits."""
+    """Return ``value`` as a cell of a table has it: from 1000 up whole with commas, below with four digits."""
     if value is None:
         return "–"
     if isinstance(value, str):
         return value
     if isinstance(value, int):
         return f"{value:,}"
-    if value == int(value) and 1000 <= abs(value) < 1e15:
-        return f"{int(value):,}"
+    if 1000 <= abs(value) < 1e9:
+        return f"{value:,.0f}".replace("-", "−")
     return f"{value:.4g}".replace("-", "−")
 
 
@@ -92,7 +92,7 @@ def page(
     parts = [
         f"<h1>{escape(title)}</h1>",
         *(f"<p>{escape(fact)}</p>" for fact in facts),
-        f"<nav><ol>{''.join(links)}</ol></nav>",
+        f"<nav><ul>{''.join(links)}</ul></nav>",
         *(f"{head(h)}\n<p>{escape(words)}</p>\n{inner}" for h, (words, inner) in tables.items()),
         head("Figures"),
         *(figure_html(i, plot, drawing) for i, (plot, drawing) in enumerate(drawings, 1)),

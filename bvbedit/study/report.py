@@ -93,6 +93,8 @@ def _page(
         "the larger counts; E_max and E_avg: the largest and the mean length of the RGB difference in 1/sr (Lee & Park "
         "2008, equation 7); and PAE and MAE: the largest and the mean difference of tone-mapped pictures, as shares of "
         "white.",
+        "The paper is J.-H. Lee, H. Park, “B-spline Volume BRDF Representation and Application in Physically-based "
+        "Rendering”, Transactions of the Society of CAD/CAM Engineers 13(6), 2008.",
         HOW_KNEE,
     ]
     ratios = contrasts(table)

@@ -109,10 +109,12 @@ def fair_means(values: Sequence[Sequence[float]]) -> Floats:
     larger than that of others: the product of a row's and a column's factor is fitted to the logarithms instead, and
     the mean taken over all columns. Two rows are comparable if more than half of each is known.
     """
-    logs = np.log(np.asarray(values, dtype=np.float64).reshape(len(values), -1))
+    if len(values) == 0:
+        return np.empty(0)
+    logs = np.log(np.asarray(values, dtype=np.float64))
     known = np.isfinite(logs)
     if known.all():
-        return np.asarray(np.exp(logs.mean(axis=1))) if logs.size else np.empty(0)
+        return np.asarray(np.exp(logs.mean(axis=1)))
     i, j = np.nonzero(known)
     n, k = logs.shape
     design = np.zeros((len(i), n + k))
