@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bvbedit.brdf.geometry import Floats
+from bvbedit.study.nets import side
 from bvbedit.study.plots import Missing, Numbers, Plot, agreement
 from bvbedit.study.quantities import E_AVG, E_MAX, R_AVG, R_MAX, Quantity, mae, pae
 from bvbedit.study.statistics import FEWEST, pearson
 from bvbedit.study.style import PALETTE, legend, log_axis, panels, pretty
-from bvbedit.study.sweeps import side
 from bvbedit.study.table import Row, Table
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ import numpy as np
 from bvbedit.brdf.geometry import Floats
 
 # Points of a frontier that a knee needs, and how far below the chord it is at least, as a share of its height.
-FEWEST, CLEAR = 3, 0.02
+FEWEST, CLEAR = 3, 0.05
 # Points that are nearer to one another, as a share of the width of the frontier, cost the same.
 SAME = 0.02
 HOW_KNEE = (

@@ -18,6 +18,7 @@ details { margin: .5rem 0; font-size: .8rem; } summary { cursor: pointer; color:
 table { border-collapse: collapse; font-size: .78rem; line-height: 1.35; }
 th, td { padding: .15rem .6rem; border-bottom: 1px solid #ddd; text-align: right; vertical-align: top; }
 th { border-bottom: 1px solid #111; vertical-align: bottom; } .text { text-align: left; }
+figure td { white-space: nowrap; }
 pre { font-size: .8rem; background: #f5f5f5; padding: .8rem; overflow-x: auto; }
 @media print { body { max-width: none; margin: 0; font-size: 10pt; } nav { display: none; } }
 """

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from bvbedit.study.quantities import Quantity, column, pae
 from bvbedit.study.statistics import pearson, spearman
-from bvbedit.study.table import Row, Table
+from bvbedit.study.table import Row
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -61,8 +61,3 @@ def agreement(rows: Sequence[Row], scenes: Sequence[str]) -> str:
         else:
             told.append(f"r = {r:.2f} in {scene} (of ranks {rho:.2f}; {len(pairs)} cells)")
     return f"Correlation of E_max with PAE over the cells shown: {'; '.join(told)}." if told else ""
-
-
-def rows_with(table: Table, *quantities: Quantity) -> list[Row]:
-    """Return the rows in which all of the quantities are known."""
-    return [row for row in table.done if all(q.value(row) is not None for q in quantities)]

@@ -161,7 +161,7 @@ def log_axis(axis: Any, low: float, high: float, *, minor: bool = True) -> None:
     getattr(axis.axes, f"set_{name}scale")("log")
     if high / low < 3:
         # Logarithmic steps are even enough here for round numbers that are.
-        axis.set_major_locator(MaxNLocator(nbins=4))
+        axis.set_major_locator(MaxNLocator(nbins=5, steps=[1, 2, 2.5, 5, 10]))
         axis.set_minor_locator(NullLocator())
         axis.set_major_formatter(FuncFormatter(lambda value, _: plain(value)))
         return

@@ -1,4 +1,4 @@
-"""Figures over n, for nets of n x n x 4n control points: the paper's Fig. 5, 6 and 7 (errors) and Fig. 10 (bytes)."""
+"""Figures of errors over n, for nets of n x n x 4n control points: the paper's Fig. 5, 6 and 7."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bvbedit.study.classes import groups
+from bvbedit.study.nets import Sweep, known, number_sides, quoted, side, sweeps
 from bvbedit.study.plots import Missing, Numbers, Plot, agreement
-from bvbedit.study.quantities import BYTES, E_AVG, E_AVG_45, E_MAX, E_MAX_45, PAYLOAD, Quantity, mae, pae
+from bvbedit.study.quantities import E_AVG, E_AVG_45, E_MAX, E_MAX_45, Quantity, mae, pae
 from bvbedit.study.style import GREY, PALETTE, legend, log_axis, looks, panels, pretty
 from bvbedit.study.table import Row, Table
 
@@ -18,30 +19,10 @@ if TYPE_CHECKING:
 # So many materials have a colour each; more are told apart by class.
 MOST_COLOURS = 7
 LINES = ("-", "--", ":", "-.")
-Sweep = dict[str, list[Row]]
-
-
-def side(row: Row) -> int | None:
-    """Return n of a net of n x n x 4n control points; None for another one."""
-    axes = row.axes
-    return axes[0] if axes is not None and axes[0] == axes[1] and axes[2] == 4 * axes[0] else None
-
-
-def sweeps(table: Table) -> Sweep:
-    """Return the measured rows of each series all of whose nets are n x n x 4n, at two n or more."""
-    found: Sweep = {}
-    for row in table.done:
-        if row.kind == "spline":
-            found.setdefault(row.series, []).append(row)
-    return {
-        series: rows
-        for series, rows in found.items()
-        if all(side(row) is not None for row in rows) and len({side(row) for row in rows}) > 1
-    }
 
 
 def sweep_plots(table: Table) -> list[Plot | Missing]:
-    """Return the figures over n of ``table``."""
+    """Return the figures of errors over n."""
     wanted: list[tuple[str, str, tuple[Quantity, ...], str]] = [
         (
             "fig5-errors-45",
@@ -68,20 +49,12 @@ def sweep_plots(table: Table) -> list[Plot | Missing]:
     found = sweeps(table)
     plots: list[Plot | Missing] = []
     for name, title, quantities, words in wanted:
-        kept = _known(found, quantities)
+        kept = known(found, quantities)
         if not kept:
             plots.append(Missing(title, "no series has nets of n x n x 4n control points at two n with these errors"))
             continue
         plots.append(_error_plot(table, kept, name, title, quantities, words))
-    kept = _known(found, (PAYLOAD, BYTES))
-    title = "Bytes over n (the paper's Fig. 10)"
-    plots.append(_byte_plot(kept, title) if kept else Missing(title, "no series has nets of n x n x 4n with bytes"))
     return plots
-
-
-def _known(found: Sweep, quantities: Sequence[Quantity]) -> Sweep:
-    kept = {s: [r for r in rows if all(q.value(r) is not None for q in quantities)] for s, rows in found.items()}
-    return {series: rows for series, rows in kept.items() if len({side(row) for row in rows}) > 1}
 
 
 def _error_plot(
@@ -93,7 +66,7 @@ def _error_plot(
     series = list(found)
     rose = _rises(found, quantities[0])
     said = (
-        f"{words}, for nets of n x n x 4n control points; {_and(series)}. "
+        f"{words}, for nets of n x n x 4n control points; {quoted(series)}. "
         + ("A colour for each material. " if few else "A thin line for each material, the median bold. ")
         + f"{pretty_words(quantities[0].label)} grows from one n to the next larger one in {rose}. "
         + agreement(every, table.scenes)
@@ -110,11 +83,6 @@ def _error_plot(
 def pretty_words(label: str) -> str:
     """Return a label as a sentence has it: without the scene."""
     return label.split(",")[0]
-
-
-def _and(names: Sequence[str]) -> str:
-    quoted = [f"“{name}”" for name in names]
-    return quoted[0] if len(quoted) == 1 else f"{', '.join(quoted[:-1])} and {quoted[-1]}"
 
 
 def _line(rows: Sequence[Row], quantity: Quantity) -> tuple[list[int], list[float]]:
@@ -216,19 +184,13 @@ def _dashes(found: Sweep) -> list[Any]:
 def _finish(at: "Axes", quantity: Quantity, ends: Sequence[float], *, bottom: bool, left: bool = True) -> None:
     if ends:
         log_axis(at.yaxis, min(ends), max(ends))
-    _sides(at)
+    number_sides(at)
     if bottom:
         at.set_xlabel("n")
     if left:
         at.set_ylabel(pretty(quantity.axis))
     else:
         at.tick_params(axis="y", which="both", labelleft=False)
-
-
-def _sides(at: "Axes") -> None:
-    from matplotlib.ticker import MaxNLocator
-
-    at.xaxis.set_major_locator(MaxNLocator(integer=True, nbins=8, steps=[1, 2, 4, 5, 10]))
 
 
 def _pivot(found: Sweep, materials: Sequence[str], quantities: Sequence[Quantity]) -> Numbers:
@@ -242,65 +204,3 @@ def _pivot(found: Sweep, materials: Sequence[str], quantities: Sequence[Quantity
                     values = (quantity.value(own[n]) if n in own else None for n in every)
                     lines.append((series, material, quantity.axis, *values))
     return Numbers(("series", "material", "quantity", *(f"n = {n}" for n in every)), tuple(lines))
-
-
-def _byte_plot(found: Sweep, title: str) -> Plot:
-    quantities = (PAYLOAD, BYTES)
-    floats = all(row.precision == "float32" for rows in found.values() for row in rows)
-    lines = []
-    for series, rows in found.items():
-        for n in sorted({n for n in map(side, rows) if n is not None}):
-            for quantity in quantities:
-                least, middle, most = _spread([r for r in rows if side(r) == n], quantity)
-                lines.append((series, n, quantity.label, least, middle, most))
-    words = (
-        f"Bytes of net and interior knots, and of the compressed .bvb file, for {_and(list(found))}: the median over "
-        "the materials, and from the least to the most as a band where they differ. "
-        + ("The grey line is 12 bytes per control point: three floats. " if floats else "")
-        + agreement([row for rows in found.values() for row in rows], _scenes(found))
-    )
-
-    def draw() -> "Figure":
-        figure, (at,) = panels(1, 1, 3.0, width=4.6)
-        ends: list[float] = []
-        for i, (series, rows) in enumerate(found.items()):
-            for quantity, dash, marker in zip(quantities, ("-", "--"), ("o", "s"), strict=True):
-                x = sorted({n for n in map(side, rows) if n is not None})
-                y = [_spread([r for r in rows if side(r) == n], quantity) for n in x]
-                colour = PALETTE[i % len(PALETTE)]
-                # The same nets in all series take the same bytes: what lies below is seen beside what lies above.
-                thick = max(0.8, 2.2 - 0.9 * i)
-                at.fill_between(x, [v[0] for v in y], [v[2] for v in y], color=colour, alpha=0.2, linewidth=0)
-                label = pretty(f"{series}, {quantity.label}")
-                at.plot(
-                    x,
-                    [v[1] for v in y],
-                    dash,
-                    color=colour,
-                    marker=marker,
-                    linewidth=thick,
-                    markersize=3 * thick,
-                    label=label,
-                )
-                ends += [v[0] for v in y] + [v[2] for v in y]
-        if floats:
-            every = np.array(sorted({n for rows in found.values() for n in map(side, rows) if n is not None}))
-            at.plot(every, 48.0 * every**3, color=GREY, linewidth=0.8, zorder=0, label="12 bytes per control point")
-        log_axis(at.yaxis, min(ends), max(ends))
-        _sides(at)
-        at.set(xlabel="n", ylabel="bytes")
-        at.legend(loc="upper left")
-        return figure
-
-    return Plot(
-        "fig10-bytes", title, words, Numbers(("series", "n", "bytes of", "least", "median", "most"), tuple(lines)), draw
-    )
-
-
-def _scenes(found: Sweep) -> list[str]:
-    return list(dict.fromkeys(p.scene for rows in found.values() for row in rows for p in row.pictures))
-
-
-def _spread(rows: Sequence[Row], quantity: Quantity) -> tuple[float, float, float]:
-    values = [v for v in (quantity.floored(row) for row in rows) if v is not None]
-    return min(values), float(np.median(values)), max(values)

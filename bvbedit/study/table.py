@@ -47,8 +47,10 @@ class Row:
     status: str = text("done, or failed", required=True, choices=("done", "failed"))
     reason: str | None = text("why it failed, in one line")
     numbers: int | None = count("", "stored numbers: 3 per control point and interior knots; or parameters")
-    file_bytes: int | None = count("bytes", "of the .bvb file; 4 per parameter of an analytic model")
-    payload_bytes: int | None = count("bytes", "of net and interior knots; 4 per parameter of an analytic model")
+    file_bytes: int | None = count("bytes", "of the .bvb file; 4 per parameter of an analytic model", low=1.0)
+    payload_bytes: int | None = count(
+        "bytes", "of net and interior knots; 4 per parameter of an analytic model", low=1.0
+    )
     condition: float | None = number("", "condition of the fit, estimated", infinite=True)
     grid_log_cosine_rms: float | None = number("", "root mean square of the difference of log(1 + f c c), over grid")
     grid_fores: float | None = number("", "cube root metric (Fores et al. 2012), over grid")

@@ -13,11 +13,11 @@ import pytest
 from bvbedit.errors import BvbError
 from bvbedit.study.correlations import correlation_matrix, reference_rows, series_of
 from bvbedit.study.figures import figures
+from bvbedit.study.nets import side, sweeps
 from bvbedit.study.page import number_text
 from bvbedit.study.plots import Missing, Plot
 from bvbedit.study.report import write_report
 from bvbedit.study.style import drawn, looks, plain, pretty
-from bvbedit.study.sweeps import side, sweeps
 from bvbedit.study.table import Table, read_table, to_csv
 from tests.study.tables import made_table
 
@@ -205,6 +205,17 @@ def test_many_materials_are_shown_by_class_and_on_several_pages():
         low, high = at.get_ylim()
         assert all(low <= min(line.get_ydata()) and max(line.get_ydata()) <= high for line in at.lines)
     assert figure.axes[0].get_ylim() == figure.axes[2].get_ylim()
+
+
+def test_any_names_and_a_single_cell_are_drawn(tmp_path):
+    table = made_table(1, sides=(4, 6), sizes=(1024,), scenes=("../a $x^$ <b>", "../a _x_ <b>"), failing=0)
+    rows = tuple(replace(row, material='ß "$\\frac" <i>', series=f"_{row.series}$") for row in table.rows[:2])
+    written = write_report(study(tmp_path, Table(rows, table.scenes)))
+    assert {path.parent for path in written.figures} == {tmp_path / "figures"}
+    names = [path.stem for path in written.figures]
+    assert len(set(names)) == len(names) // 2
+    assert "fig7-image-errors-..-a-x-b-2" in names
+    assert '<td class="text">ß &quot;$\\frac&quot; &lt;i&gt;</td>' in written.page.read_text()
 
 
 def test_a_damaged_study_is_told(tmp_path):
