@@ -86,8 +86,8 @@ def _page(
 ) -> str:
     name = folder.resolve().name
     facts = [
-        f"{len(table.materials)} materials by {len(table.configurations)} configurations: {len(table.done)} cells were "
-        f"measured, {len(table.failed)} failed. Scenes: {', '.join(table.scenes) or 'none'}.",
+        f"{len(table.materials)} materials by {len(table.configurations)} configurations: {len(table.done):,} cells "
+        f"were measured, {len(table.failed)} failed. Scenes: {', '.join(table.scenes) or 'none'}.",
         "Errors are log-cosine RMS: the root mean square of the difference of log(1 + f cos θ_i cos θ_o), over two "
         "sets of pairs of directions (grid: even steps; nodes: as MERL's, mostly near the mirror direction), of which "
         "the larger counts; E_max and E_avg: the largest and the mean length of the RGB difference in 1/sr (Lee & Park "
