@@ -119,8 +119,30 @@ _ALL = (
 MATERIALS: Mapping[str, Material] = MappingProxyType({m.name: m for m in _ALL})
 
 
+def is_material(name: object) -> bool:
+    """Return whether there is a sample material called ``name``, by hand or in the generated database."""
+    if not isinstance(name, str):
+        return False
+    if name in MATERIALS:
+        return True
+    from bvbedit.brdf.database import generated
+
+    try:
+        return bool(generated(name))
+    except BvbError:
+        return False
+
+
 def material_named(name: str) -> Material:
-    """Return the sample material called ``name``. Raises BvbError that lists the names where there is none."""
-    if not isinstance(name, str) or name not in MATERIALS:
-        raise BvbError(f"Unknown material {shown(name)}. Choose one of {', '.join(MATERIALS)}.")
-    return MATERIALS[name]
+    """Return the sample material called ``name``, by hand or in the generated database (like "db-017").
+
+    Raises BvbError that lists the names where there is none.
+    """
+    if isinstance(name, str) and name in MATERIALS:
+        return MATERIALS[name]
+    # Here, so that those who want none of the database do not load it.
+    from bvbedit.brdf.database import generated, is_generated
+
+    if is_generated(name):
+        return generated(name)
+    raise BvbError(f"Unknown material {shown(name)}. Choose one of {', '.join(MATERIALS)}, or db-000 ... db-999.")

@@ -1,13 +1,15 @@
 """Commands that make measurements out of nothing: a simulated goniophotometer looks at an analytic material."""
 
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
-from cyclopts import App
+from cyclopts import App, Parameter
 
 from bvbedit.cli.models import Json
 from bvbedit.cli.output import progress, report
 from bvbedit.errors import BvbError
+
+GENERATED = "Generated: matte, glossy and mirror-like, each another; `bvbedit sample make --all FOLDER` writes the first 100"
 
 sample_app = App(name="sample", help="List and make sample measurements.")
 
@@ -23,21 +25,25 @@ def list_samples(*, as_json: Json = False) -> None:
     """
     from bvbedit.brdf.materials import MATERIALS
 
-    report({name: material.description for name, material in MATERIALS.items()}, as_json)
+    listed = {name: material.description for name, material in MATERIALS.items()}
+    report({**listed, "db-000 ... db-999": GENERATED}, as_json)
 
 
 @sample_app.command
 def make(
-    name: str,
-    target: Path,
+    name: str | None = None,
+    target: Path | None = None,
     /,
     *,
+    all_: Annotated[Path | None, Parameter(name="--all")] = None,
+    count: int | None = None,
+    jobs: int | None = None,
     grid: Literal["merl", "paper"] | None = None,
-    noise: float = 0.0,
+    noise: float | None = None,
     seed: int = 0,
     as_json: Json = False,
 ) -> None:
-    """Measure a sample material with the simulated goniophotometer.
+    """Measure a sample material with the simulated goniophotometer, or with --all those of the generated database.
 
     Parameters
     ----------
@@ -47,14 +53,31 @@ def make(
         The file to write: .binary (MERL's format) or .npz (table).
     grid
         merl (90 x 90 x 180 half/difference angles) or paper (91 x 91 x 361 angles in and out; .npz only). Follows
-        from the target's suffix if not given.
+        from the target's suffix if not given; with --all it is merl.
+    all_
+        Write the generated database to this folder, 35 MB for each file, in place of one material. Each is measured
+        with its own noise. Files that are there and whole stay.
+    count
+        With --all: how many materials; 100 if not given.
+    jobs
+        With --all: how many at once; 1 if not given. The files do not depend on it.
     noise
-        Relative standard deviation of the readings, like 0.05; 0 is an ideal instrument.
+        Relative standard deviation of the readings, like 0.05; 0, an ideal instrument, if not given.
     seed
-        Chooses the noise.
+        Chooses the noise; with --all, the materials.
     as_json
         Print one JSON object.
     """
+    if all_ is not None:
+        if name is not None or noise is not None:
+            raise BvbError("--all takes no material and no noise: each has its own. Leave them out.")
+        _make_all(all_, 100 if count is None else count, seed, grid or "merl", 1 if jobs is None else jobs, as_json)
+        return
+    if name is None or target is None:
+        raise BvbError("Nothing to make. Name a material and a file, or --all and a folder.")
+    if count is not None or jobs is not None:
+        raise BvbError("--count and --jobs go with --all. Leave them out, or name a folder with --all.")
+    noise = 0.0 if noise is None else noise
     from bvbedit import api
     from bvbedit.brdf.goniophotometer import measure
     from bvbedit.brdf.materials import material_named
@@ -82,3 +105,23 @@ def make(
         },
         as_json,
     )
+
+
+def _make_all(folder: Path, count: int, seed: int, grid: Literal["merl", "paper"], jobs: int, as_json: bool) -> None:
+    from bvbedit.brdf.database import database
+    from bvbedit.io.database import write_database
+
+    materials = list(database(count, seed).values())
+    with progress(f"Measuring {count} materials") as watch:
+        written = write_database(materials, folder, grid=grid, jobs=jobs, progress=watch)
+    kept = sum(w.status == "kept" for w in written)
+    told = {
+        "folder": str(folder),
+        "grid": grid,
+        "seed": seed,
+        "count": count,
+        "made": count - kept,
+        "kept": kept,
+        "bytes": sum(w.bytes for w in written),
+    }
+    report({**told, "materials": [w.to_dict() for w in written]} if as_json else told, as_json)

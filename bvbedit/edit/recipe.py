@@ -23,7 +23,7 @@ from typing import Any, Literal
 
 from bvbedit.brdf.base import Brdf
 from bvbedit.brdf.goniophotometer import measure
-from bvbedit.brdf.materials import MATERIALS, material_named
+from bvbedit.brdf.materials import is_material, material_named
 from bvbedit.brdf.spline_brdf import SplineBrdf
 from bvbedit.edit.combining import Blend
 from bvbedit.edit.document import Document, digest
@@ -182,7 +182,7 @@ def read_recipe(path: str | os.PathLike[str], settings: Sequence[str] = ()) -> R
         # A source may be written as its file or sample alone.
         alone = data.get("source")
         if isinstance(alone, str):
-            data["source"] = {"sample" if alone in MATERIALS else "file": alone}
+            data["source"] = {"sample" if is_material(alone) else "file": alone}
         for setting in settings:
             _set(data, setting)
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 from os import PathLike, fspath
 from pathlib import Path
 
-from bvbedit.brdf.materials import MATERIALS
+from bvbedit.brdf.materials import is_material
 from bvbedit.errors import BvbError
 from bvbedit.render.lights import Panorama
 from bvbedit.render.scene import MeshFile, Object, Scene, Sphere
@@ -56,6 +56,6 @@ def scene_with_environment(path: str | PathLike[str]) -> Scene:
 
 def _found(thing: Object, folder: Path) -> Object:
     """Return an object whose files are looked for in ``folder``."""
-    if isinstance(thing.material, str) and thing.material not in MATERIALS:
+    if isinstance(thing.material, str) and not is_material(thing.material):
         thing = replace(thing, material=str(folder / thing.material))
     return replace(thing, file=str(folder / thing.file)) if isinstance(thing, MeshFile) else thing

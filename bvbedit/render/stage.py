@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from bvbedit.brdf.analytic import Lambert
 from bvbedit.brdf.base import Brdf
 from bvbedit.brdf.density import Density
-from bvbedit.brdf.materials import MATERIALS
+from bvbedit.brdf.materials import is_material, material_named
 from bvbedit.errors import BvbError
 from bvbedit.io import load
 from bvbedit.jit import frozen
@@ -157,7 +157,7 @@ def make_stage(scene: Scene, models: Sequence[Brdf], densities: Sequence[Density
 def _material(name: Material) -> Brdf:
     """Return the BRDF of a diffuse colour, of a sample material, or of a file."""
     if isinstance(name, str):
-        return MATERIALS[name].brdf if name in MATERIALS else load(name)
+        return material_named(name).brdf if is_material(name) else load(name)
     assert not isinstance(name, int)
     return Lambert(name)
 

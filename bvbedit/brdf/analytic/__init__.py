@@ -5,7 +5,7 @@ to the last bit, finite for every pair of directions. Colours are one number for
 """
 
 from bvbedit.brdf.analytic.common import Analytic, Colour, Pair
-from bvbedit.brdf.analytic.empirical import CosineLobe, Lafortune, Lambert, Ward
+from bvbedit.brdf.analytic.empirical import BlinnPhong, CosineLobe, Lafortune, Lambert, Ward
 from bvbedit.brdf.analytic.fresnel import ExactFresnel, Fresnel, Schlick
 from bvbedit.brdf.analytic.layered import Coated, Sum
 from bvbedit.brdf.analytic.microfacet import GGX, CookTorrance
@@ -13,6 +13,7 @@ from bvbedit.brdf.analytic.microfacet import GGX, CookTorrance
 __all__ = [
     "GGX",
     "Analytic",
+    "BlinnPhong",
     "Coated",
     "Colour",
     "CookTorrance",

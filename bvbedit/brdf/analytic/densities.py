@@ -50,6 +50,28 @@ class Beckmann(Density):
 
 
 @dataclass(frozen=True)
+class HalfPower(Density):
+    """Half vectors by (n + 1)/(2 pi) cos^n theta_h: Blinn-Phong's.
+
+    Source: PBRT, first edition, section 15.5 (sampling the Blinn distribution).
+    """
+
+    n: float
+
+    def sample(self, wo: Floats, u: Floats) -> tuple[Floats, Floats]:
+        # 1/cos^2 - 1 by expm1, so that narrow lobes keep their digits.
+        tan2 = np.expm1(-2 / (self.n + 1) * np.log1p(-u[:, 0]))
+        return _mirrored(self, wo, _at_slope(tan2, 2 * np.pi * u[:, 1]))
+
+    def pdf(self, wi: Floats, wo: Floats) -> Floats:
+        h, along = _half(wi, wo)
+        seen = (h[:, 2] > 0) & (along > 0)
+        sin2 = np.minimum(h[:, 0] ** 2 + h[:, 1] ** 2, 1 - 1e-15)
+        power = np.exp(0.5 * self.n * np.log1p(-sin2))
+        return np.where(seen, (self.n + 1) / (2 * np.pi) * power / (4 * np.where(seen, along, 1.0)), 0.0)
+
+
+@dataclass(frozen=True)
 class VisibleGGX(Density):
     """Half vectors by G1(wo) (wo.h) D / cos theta_o: those GGX facets that the viewer sees.
 

@@ -1,4 +1,4 @@
-"""Models made to fit measurements: Lambert, Lafortune's cosine lobes, Ward."""
+"""Models made to fit measurements: Lambert, Blinn-Phong, Lafortune's cosine lobes, Ward."""
 
 import math
 from collections.abc import Sequence
@@ -8,7 +8,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from bvbedit.brdf.analytic.common import DIFFUSE_SHARE, ROUGHNESS, Analytic, Colour, Pair, colour, number
-from bvbedit.brdf.analytic.densities import Beckmann, Cosine, CosinePower, Mixture
+from bvbedit.brdf.analytic.densities import Beckmann, Cosine, CosinePower, HalfPower, Mixture
 from bvbedit.brdf.density import Density
 from bvbedit.brdf.geometry import Floats
 from bvbedit.errors import BvbError
@@ -33,6 +33,44 @@ class Lambert(Analytic):
 
     def reflectance(self, pair: Pair) -> Floats:
         return np.tile(np.asarray(self.albedo) / np.pi, (len(pair), 1))
+
+
+# Blinn-Phong's exponent: the narrowest lobe is as wide as that of the least roughness, n = 2/alpha^2.
+EXPONENT = (0.01, 2e8)
+
+
+@dataclass(frozen=True)
+class BlinnPhong(Analytic):
+    """f = diffuse/pi + specular C cos^n theta_h, C = (n + 2)(n + 4) / (8 pi (2^(-n/2) + n)).
+
+    Blinn, "Models of light reflection for computer synthesized pictures", SIGGRAPH 1977, as a BRDF (without the
+    division by a cosine). With C the lobe's albedo is ``specular`` at normal incidence, where it is largest: Giesen,
+    "Phong and Blinn-Phong normalization factors", 2009.
+    Raises BvbError for n outside [0.01, 2e8] or colours outside [0, 1].
+    """
+
+    specular: Colour
+    n: float
+    diffuse: Colour = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "specular", colour("BlinnPhong", "specular", self.specular, 0.0, 1.0))
+        object.__setattr__(self, "n", number("BlinnPhong", "n", self.n, *EXPONENT))
+        object.__setattr__(self, "diffuse", colour("BlinnPhong", "diffuse", self.diffuse, 0.0, 1.0))
+
+    @property
+    def density(self) -> Density:
+        return Mixture([Cosine(), HalfPower(self.n)], [DIFFUSE_SHARE, 1 - DIFFUSE_SHARE])
+
+    def lobe(self, pair: Pair) -> Floats:
+        """Return the lobe (n,) of specular albedo one, in 1/sr."""
+        n = self.n
+        C = (n + 2) * (n + 4) / (8 * np.pi * (2 ** (-n / 2) + n))
+        # cos^n theta_h = (1 + tan^2 theta_h)^(-n/2) keeps its digits in the narrowest lobe.
+        return np.asarray(C * np.exp(-0.5 * n * np.log1p(pair.tan2_h)))
+
+    def reflectance(self, pair: Pair) -> Floats:
+        return np.asarray(np.asarray(self.diffuse) / np.pi + self.lobe(pair)[:, None] * np.asarray(self.specular))
 
 
 # The largest f that a cosine lobe may reach (1/sr): beyond it is an overflow in the making, not a material.
@@ -136,11 +174,15 @@ class Ward(Analytic):
     def density(self) -> Density:
         return Mixture([Cosine(), Beckmann(self.alpha)], [DIFFUSE_SHARE, 1 - DIFFUSE_SHARE])
 
-    def reflectance(self, pair: Pair) -> Floats:
+    def lobe(self, pair: Pair) -> Floats:
+        """Return the lobe (n,) of ``specular`` one, in 1/sr."""
         a2 = self.alpha**2
         lobe = np.exp(-pair.tan2_h / a2) / (np.pi * a2)
         if self.normalisation == "bounded":
             lobe *= pair.sum2 / pair.sum_z**4
         else:
             lobe /= 4 * np.sqrt(pair.cos_i * pair.cos_o)
-        return np.asarray(np.asarray(self.diffuse) / np.pi + lobe[:, None] * np.asarray(self.specular))
+        return np.asarray(lobe)
+
+    def reflectance(self, pair: Pair) -> Floats:
+        return np.asarray(np.asarray(self.diffuse) / np.pi + self.lobe(pair)[:, None] * np.asarray(self.specular))

@@ -37,14 +37,18 @@ class CookTorrance(Analytic):
     def density(self) -> Density:
         return Mixture([Cosine(), Beckmann(self.m)], [DIFFUSE_SHARE, 1 - DIFFUSE_SHARE])
 
-    def reflectance(self, pair: Pair) -> Floats:
+    def facets(self, pair: Pair) -> Floats:
+        """Return D G / (4 cos theta_i cos theta_o) (n,), in 1/sr: the lobe of facets that reflect all."""
         m2 = self.m**2
         D = np.exp(-pair.tan2_h / m2) / (np.pi * m2 * pair.cos2_h**2)
         # G / (4 cos_i cos_o) with the cosines cancelled; 2 (n.h)/(wo.h) = 4 (cos_i + cos_o)/|wi + wo|^2.
         groove = 4 * pair.sum_z / pair.sum2
         smaller, larger = np.minimum(pair.cos_i, pair.cos_o), np.maximum(pair.cos_i, pair.cos_o)
         V = np.minimum(1 / smaller, groove) / (4 * larger)
-        lobe = (D * V)[:, None] * self.fresnel(pair.cos_d)
+        return np.asarray(D * V)
+
+    def reflectance(self, pair: Pair) -> Floats:
+        lobe = self.facets(pair)[:, None] * self.fresnel(pair.cos_d)
         return np.asarray(np.asarray(self.diffuse) / np.pi + lobe * np.asarray(self.specular))
 
 
@@ -71,11 +75,15 @@ class GGX(Analytic):
     def density(self) -> Density:
         return VisibleGGX(self.alpha)
 
-    def reflectance(self, pair: Pair) -> Floats:
+    def facets(self, pair: Pair) -> Floats:
+        """Return D G / (4 cos theta_i cos theta_o) (n,), in 1/sr: the lobe of facets that reflect all."""
         a2 = self.alpha**2
         D = 1 / (np.pi * a2 * (pair.cos2_h + pair.sin2_h / a2) ** 2)
         # G / (4 cos_i cos_o), where cos theta (1 + 2 Lambda) = sqrt(alpha^2 + (1 - alpha^2) cos^2 theta).
         root_i = np.sqrt(a2 + (1 - a2) * pair.cos_i**2)
         root_o = np.sqrt(a2 + (1 - a2) * pair.cos_o**2)
         V = 0.5 / (pair.cos_o * root_i + pair.cos_i * root_o)
-        return np.asarray((D * V)[:, None] * self.fresnel(pair.cos_d))
+        return np.asarray(D * V)
+
+    def reflectance(self, pair: Pair) -> Floats:
+        return np.asarray(self.facets(pair)[:, None] * self.fresnel(pair.cos_d))
