@@ -106,7 +106,9 @@ def fit_analytic(
         raise BvbError(f"starts is {shown(starts)}. Give a whole number in 1 ... 1000.")
     few = _Objective(drawn(brdf, FEW, seed), kind.lobes, loss)
     if not len(few.pair):
-        raise BvbError("No data stand behind any of the pairs that were drawn. Give a measurement with more valid cells.")
+        raise BvbError(
+            "No data stand behind any of the pairs that were drawn. Give a measurement with more valid cells."
+        )
     ends: list[_Search] = []
     for lobes, x in _starts(kind, few, starts, np.random.Generator(np.random.PCG64(seed))):
         ends.append(_Search(few.of(lobes), x).run())
@@ -297,7 +299,9 @@ def _starts(
         # What the last lobe may also be is tried once in a while.
         lobes = forms[1 + n // OTHERS % (len(forms) - 1)] if len(forms) > 1 and n % OTHERS == 3 else forms[0]
         spread, broader, *growth = generator.random(2 + len(lobes))
-        width, factor = (0.0, 1.2) if n == 0 else (SPREAD * (2 * spread - 1), float(np.interp(broader, (0, 1), BROADER)))
+        width, factor = (
+            (0.0, 1.2) if n == 0 else (SPREAD * (2 * spread - 1), float(np.interp(broader, (0, 1), BROADER)))
+        )
         shapes = []
         for k, lobe in enumerate(lobes):
             half = min(theta * math.exp(width + k * factor), 0.8)

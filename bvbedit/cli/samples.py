@@ -9,7 +9,9 @@ from bvbedit.cli.models import Json
 from bvbedit.cli.output import progress, report
 from bvbedit.errors import BvbError
 
-GENERATED = "Generated: matte, glossy and mirror-like, each another; `bvbedit sample make --all FOLDER` writes the first 100"
+GENERATED = (
+    "Generated: matte, glossy and mirror-like, each another; `bvbedit sample make --all FOLDER` writes the first 100"
+)
 
 sample_app = App(name="sample", help="List and make sample measurements.")
 

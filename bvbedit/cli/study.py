@@ -1,19 +1,24 @@
 """Commands of studies: study, and what is told from it."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from cyclopts import App
 
 from bvbedit.cli.models import Json
 from bvbedit.cli.output import progress, report
 
+if TYPE_CHECKING:
+    from bvbedit.study.table import Row
+
 study_app = App(name="study", help="Measure what accuracy costs in bytes and time, over materials and configurations.")
+study_app.command("bvbedit.cli.study_report:report", help="Write the report of a study.")
 
 
 @study_app.default
 def study(
     *materials: Path,
-    out: Path,
+    out: Path = Path("study"),
     plan: Path | None = None,
     jobs: int = 1,
     dask: str | None = None,
@@ -41,7 +46,8 @@ def study(
 
     from bvbedit.errors import BvbError
     from bvbedit.study.plan import default_plan, read_plan
-    from bvbedit.study.run import RESULTS, failed, materials_of, run_study
+    from bvbedit.study.run import failed, materials_of, run_study
+    from bvbedit.study.table import RESULTS
 
     if not 1 <= jobs <= 256:
         raise BvbError(f"jobs is {jobs}. Give 1 to 256.")
@@ -59,12 +65,12 @@ def study(
             "configurations": len(read.configurations),
             "cells": len(rows),
             "failed": len(lost),
-            **(
-                {"first_failure": f"{lost[0]['material']}, {lost[0]['configuration']}: {lost[0]['reason']}"}
-                if lost
-                else {}
-            ),
+            **({"first_failure": _reason(lost[0])} if lost else {}),
             "seconds": perf_counter() - start,
         },
         as_json,
     )
+
+
+def _reason(row: "Row") -> str:
+    return f"{row.material}, {row.configuration}: {row.reason}"

@@ -173,7 +173,7 @@ def default_plan() -> Plan:
     precision cost, and the analytic models."""
     n = tuple((k, k, 4 * k) for k in (6, 8, 10, 12, 14, 16, 18, 20))
     kib = tuple(k * KIB for k in (2, 4, 8, 16, 32, 64))
-    paper = {"chart": "in-out", "encoding": "linear", "precision": "float32"}
+    paper: dict[str, Any] = {"chart": "in-out", "encoding": "linear", "precision": "float32"}
     return Plan(
         series=(
             Series("paper", knots="piegl-tiller", size=n, **paper),

@@ -2,6 +2,7 @@
 
 import json
 import os
+import tomllib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -12,6 +13,8 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
+import tomlkit
+
 from bvbedit.brdf.materials import MATERIALS, material_named
 from bvbedit.edit.recipe import Source
 from bvbedit.errors import BvbError
@@ -19,11 +22,11 @@ from bvbedit.io import make_folder
 from bvbedit.io.files import reading, replacing
 from bvbedit.study.cells import Task, measured, versions
 from bvbedit.study.plan import Configuration, Plan
-from bvbedit.study.table import to_csv
+from bvbedit.study.table import RESULTS, Row, to_csv
 from bvbedit.threads import one_matrix_thread
 
 SUFFIXES = (".binary", ".bsdf", ".npz")
-RESULTS, PLAN, VERSIONS, CELLS = "results.csv", "plan.json", "versions.json", "cells"
+PLAN, VERSIONS, CELLS = "plan.toml", "versions.json", "cells"
 # Seconds to wait for a scheduler.
 PATIENCE = 10
 
@@ -74,7 +77,7 @@ def run_study(
     jobs: int = 1,
     dask: str | None = None,
     told: Told | None = None,
-) -> list[dict[str, Any]]:
+) -> list[Row]:
     """Measure all cells that are not measured yet, and return all rows; ``out`` keeps them, and the table.
 
     ``jobs`` processes share the cells, or the workers of the Dask cluster at the address ``dask``, which must see the
@@ -100,9 +103,10 @@ def run_study(
         done += 1
         if told is not None:
             told(done, len(tasks), row)
-    rows = [json.loads(_text(place)) for place in tasks]
+    scenes = [Path(scene).stem for scene in plan.pictures.scenes]
+    rows = [Row.of(json.loads(_text(place)), scenes) for place in tasks]
     with replacing(out / RESULTS) as stream:
-        stream.write(to_csv(rows).encode())
+        stream.write(to_csv(rows, scenes).encode())
     return rows
 
 
@@ -184,15 +188,16 @@ def _share(jobs: int) -> None:
 @contextmanager
 def _cluster(address: str) -> Iterator[Executor]:
     try:
-        from distributed import Client
+        import distributed
     except ImportError:
         raise BvbError("A Dask cluster needs the package distributed: pip install 'bvbedit[study]'.") from None
     try:
-        client = Client(address, timeout=PATIENCE, set_as_default=False)
+        client: Any = distributed.Client(address, timeout=PATIENCE, set_as_default=False)  # type: ignore[no-untyped-call]
     except (OSError, TimeoutError, ValueError) as error:
         raise BvbError(f"No Dask scheduler answers at {address} ({error}). Start one, or leave --dask out.") from None
     try:
-        yield client.get_executor(pure=False)
+        executor: Executor = client.get_executor(pure=False)
+        yield executor
     finally:
         client.close()
 
@@ -204,27 +209,33 @@ def _place(out: Path, material: str, configuration: Configuration) -> Path:
 
 def _check_same(plan: Plan, materials: dict[str, Source], out: Path) -> None:
     """Keep what the results are of, or check that it is the same as before."""
-    told = {
-        "plan": plan.to_dict(),
-        "materials": {name: _sum(source) for name, source in materials.items()},
-        "scenes": {scene: _bytes_sum(Path(scene)) for scene in plan.pictures.scenes if Path(scene).exists()},
-    }
+    # As TOML and JSON have it: tuples are lists.
+    told = json.loads(json.dumps(_told(plan, materials)))
     kept = out / PLAN
     if kept.exists():
         try:
-            before = json.loads(_text(kept))
+            before = tomllib.loads(_text(kept))
         except ValueError:
             raise BvbError(f"{kept} is damaged. Remove {out}, or choose another --out.") from None
-        if before != json.loads(json.dumps(told)):
-            what = next((key for key in told if before.get(key) != json.loads(json.dumps(told[key]))), "plan")
-            raise BvbError(f"{out} holds results of other {what}. Choose another --out, or remove it.")
+        other = next((what for what in told if before.get(what) != told[what]), None)
+        if other is not None:
+            raise BvbError(f"{out} holds results of other {other}. Choose another --out, or remove it.")
     elif any((out / CELLS).iterdir()):
         raise BvbError(f"{out} holds cells, but not their plan. Choose another --out, or remove it.")
     else:
         with replacing(kept) as stream:
-            stream.write(json.dumps(told, indent=1).encode())
+            stream.write(tomlkit.dumps(told).encode())
     with replacing(out / VERSIONS) as stream:
         stream.write(json.dumps(dict(versions()), indent=1).encode())
+
+
+def _told(plan: Plan, materials: dict[str, Source]) -> dict[str, Any]:
+    """Return all that results depend on."""
+    return {
+        "plan": plan.to_dict(),
+        "materials": {name: _sum(source) for name, source in materials.items()},
+        "scenes": {scene: _bytes_sum(Path(scene)) for scene in plan.pictures.scenes if Path(scene).exists()},
+    }
 
 
 def _sum(source: Source) -> str:
@@ -249,6 +260,6 @@ def _text(path: Path) -> str:
         return stream.read().decode()
 
 
-def failed(rows: Iterable[dict[str, Any]]) -> list[dict[str, Any]]:
+def failed(rows: Iterable[Row]) -> list[Row]:
     """Return the rows of cells that could not be made."""
-    return [row for row in rows if row["status"] != "done"]
+    return [row for row in rows if row.status != "done"]

@@ -122,7 +122,8 @@ class Saving:
         finally:
             self.state.saving = False
         self.state.dialog = ""
-        self.state.toast = f"Exported {self._viewer.session.places.shown(path)}; read back, log_cosine_rms is {missed.grid.log_cosine_rms:.2g}"
+        shown, error = self._viewer.session.places.shown(path), missed.grid.log_cosine_rms
+        self.state.toast = f"Exported {shown}; read back, log_cosine_rms is {error:.2g}"
 
     def _check_settled(self) -> None:
         """Raise BvbError while an edit is being tried: it is seen, but would not be in the file."""

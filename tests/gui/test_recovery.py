@@ -155,7 +155,9 @@ def test_closing_or_saving_a_model_without_a_file_forgets_what_was_kept(folder):
     assert len(offered(folder)) == 2
     session.close(2)
     session.current = 1
-    session.save(folder / "elsewhere.bvb")
+    document = session.check_save(folder / "elsewhere.bvb")
+    document.save(folder / "elsewhere.bvb")
+    session.saved(folder / "elsewhere.bvb", document, 1)
     assert offered(folder) == []
     assert not session.here.unsaved
 
@@ -216,11 +218,14 @@ def test_what_was_kept_of_a_file_that_is_open_does_not_open_it_twice(folder):
     session.keep()
 
     async def use(viewer):
+        assert viewer.state.kept_here == "gold.bvb"
+        await brighter(viewer, 3.0)
         await do(viewer, viewer.opening.recover, "gold.bvb")
-        assert "is open" in viewer.state.error_open
+        assert "is open, and has changes" in viewer.state.error_open
+        await do(viewer, viewer.editing.undo)
+        await do(viewer, viewer.opening.recover, "gold.bvb")
         assert len(viewer.state.documents) == 1
-        await do(viewer, viewer.opening.close)
-        await do(viewer, viewer.opening.recover, "gold.bvb")
         assert viewer.session.document.edits[-1].line() == "gain factor=2"
+        assert viewer.state.kept_here == ""
 
     with_viewer(folder, use, "gold.bvb")
