@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from bvbedit.brdf.analytic import (
     GGX,
     Analytic,
+    BlinnPhong,
     Coated,
     CookTorrance,
     CosineLobe,
@@ -32,6 +33,8 @@ METAL = ExactFresnel((0.2, 1.0, 3.0), (3.6, 2.5, 0.0))
 MODELS: dict[str, Analytic] = {
     "lambert": Lambert((0.2, 0.5, 1.0)),
     "lafortune": Lafortune([CosineLobe(-1, (0.9, 1, 1.1), (20, 5, 30)), CosineLobe(0.8, 0.5, 3)], diffuse=0.1),
+    "blinn-phong": BlinnPhong((0.9, 0.5, 0.1), 30.0, diffuse=0.1),
+    "narrowest-blinn-phong": BlinnPhong(1.0, 2e8),
     "ward": Ward((0.9, 0.5, 0.1), 0.2, diffuse=0.1),
     "ward-1992": Ward((0.9, 0.5, 0.1), 0.2, diffuse=0.1, normalisation="1992"),
     "cook-torrance": CookTorrance(0.3, METAL, specular=0.8, diffuse=(0.1, 0.2, 0.3)),
@@ -121,7 +124,13 @@ def oracle_lobe(wi, wo, c_xy, c_z, n):
     return max(0.0, c_xy * (wi[0] * wo[0] + wi[1] * wo[1]) + c_z * wi[2] * wo[2]) ** n
 
 
+def oracle_blinn(wi, wo, n):
+    c = (n + 2) * (n + 4) / (8 * math.pi * (2 ** (-n / 2) + n))
+    return c * oracle_angles(wi, wo)[2] ** n
+
+
 ORACLES = {
+    "blinn-phong": lambda wi, wo, c: 0.1 / math.pi + (0.9, 0.5, 0.1)[c] * oracle_blinn(wi, wo, 30.0),
     "lafortune": lambda wi, wo, c: (
         0.1 / math.pi + oracle_lobe(wi, wo, -1, (0.9, 1, 1.1)[c], (20, 5, 30)[c]) + oracle_lobe(wi, wo, 0.8, 0.5, 3)
     ),
@@ -281,7 +290,8 @@ def test_lafortune_lobe_grows_towards_grazing_and_back_to_the_light():
 @pytest.mark.parametrize("theta", np.radians([0, 30, 60, 80, 88]))
 @pytest.mark.parametrize("alpha", [1e-3, 0.05, 0.3, 1.0])
 def test_no_model_gives_back_more_than_it_gets(alpha, theta):
-    for model in (GGX(alpha, WHITE), CookTorrance(alpha, WHITE), Ward(1.0, alpha), Ward(1.0, alpha, 0, "1992")):
+    phong = BlinnPhong(1.0, 2 / alpha**2)
+    for model in (GGX(alpha, WHITE), CookTorrance(alpha, WHITE), Ward(1.0, alpha), Ward(1.0, alpha, 0, "1992"), phong):
         # 5e-3: the horizon cuts through cells of the quadrature.
         assert albedo(model, theta).max() <= 1 + 5e-3, model
 
@@ -290,6 +300,11 @@ def test_no_model_gives_back_more_than_it_gets(alpha, theta):
 def test_smooth_lossless_surfaces_give_back_everything(theta):
     for model in (GGX(0.003, WHITE), CookTorrance(0.01, WHITE), Ward(1.0, 0.01)):
         np.testing.assert_allclose(albedo(model, theta), 1, atol=4e-3)
+
+
+@pytest.mark.parametrize("n", [0.01, 1.0, 20.0, 1e4, 2e8])
+def test_blinn_phongs_albedo_is_its_specular_at_normal_incidence(n):
+    np.testing.assert_allclose(albedo(BlinnPhong(0.8, n), 0.0, narrowest=0.01 / math.sqrt(n + 1)), 0.8, rtol=3e-3)
 
 
 @pytest.mark.parametrize("theta", np.radians([0, 40, 70]))
@@ -383,6 +398,9 @@ def test_models_are_values():
         (lambda: Ward(0.5, math.inf), "alpha is inf"),
         (lambda: Ward(0.5, 0.1, 0, "duer"), "bounded, 1992"),
         (lambda: Ward(0.5, 0.1, 0, ["1992"]), "bounded, 1992"),
+        (lambda: BlinnPhong(0.5, 0), "n is 0"),
+        (lambda: BlinnPhong(1.5, 10), "specular is 1.5"),
+        (lambda: BlinnPhong(0.5, 10, -1), "diffuse is -1"),
         (lambda: Schlick(-0.1), "f0"),
         (lambda: ExactFresnel(0.0), "eta"),
         (lambda: ExactFresnel(1.5, -1), "k is -1"),

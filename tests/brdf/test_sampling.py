@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bvbedit.brdf.analytic import GGX, CookTorrance, CosineLobe, Lafortune, Lambert, Schlick, Ward
+from bvbedit.brdf.analytic import GGX, BlinnPhong, CookTorrance, CosineLobe, Lafortune, Lambert, Schlick, Ward
 from bvbedit.brdf.base import Brdf
 from bvbedit.brdf.blend import blend
 from bvbedit.brdf.charts import HALF_DIFF, IN_OUT
@@ -60,6 +60,8 @@ def _model(what: str) -> Brdf:
             return Lafortune([CosineLobe(-1.0, (0.95, 0.9, 0.9), (200.0, 20.0, 20.0))], diffuse=0.2)
         case "cook-torrance":
             return CookTorrance(0.15, Schlick(0.6), diffuse=0.1)
+        case "blinn-phong":
+            return BlinnPhong(0.3, 200.0, 0.3)
         case "ward":
             return Ward(0.3, 0.08, 0.3)
         case "ward-1992":
@@ -70,7 +72,7 @@ def _model(what: str) -> Brdf:
 
 
 NETS = ("half-diff", "in-out", "blended", "sculpted", "glossy", "measurement", "black")
-LOBES = ("lafortune", "cook-torrance", "ward", "ward-1992", "mirror")
+LOBES = ("blinn-phong", "lafortune", "cook-torrance", "ward", "ward-1992", "mirror")
 ALL = (*MATERIALS, *NETS, *LOBES)
 # Models with a highlight, that are drawn by a density of their own.
 HIGHLIGHTS = ("half-diff", "in-out", "sculpted", "glossy", "measurement")
