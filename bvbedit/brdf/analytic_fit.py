@@ -4,24 +4,23 @@ What is minimised is the product of the metric over both sample sets. A search (
 exact ones for colours, by differences of the lobe alone for shapes. With six measurements LD_LBFGS and LD_VAR2 came to
 the same errors in about the same time, methods without gradients (LN_SBPLX, LN_BOBYQA) took 3 to 10 times as long for
 the same or worse. Errors may have several minima: there are several starts, on few pairs of directions, and the best
-goes on on many. Of those measurements, 8 starts found what 64 did.
+goes on on many. Of those measurements, 8 starts found what 40 or 64 did.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
-from functools import cached_property
-from types import MappingProxyType
 
 import numpy as np
 
 from bvbedit.brdf.analytic import Analytic
-from bvbedit.brdf.analytic.common import Pair
 from bvbedit.brdf.analytic_models import MODELS, Lobe, Parametric, assembled, model_to_fit
+from bvbedit.brdf.analytic_objective import Objective
 from bvbedit.brdf.base import Brdf, check_brdf
 from bvbedit.brdf.geometry import Floats
-from bvbedit.brdf.losses import Loss, loss_named
-from bvbedit.brdf.samples import Reflectance, drawn
+from bvbedit.brdf.losses import loss_named
+from bvbedit.brdf.samples import drawn
 from bvbedit.errors import BvbError
 from bvbedit.spline.arguments import is_whole, shown
 
@@ -30,22 +29,16 @@ __all__ = ["MODELS", "AnalyticFit", "fit_analytic"]
 # Pairs drawn from each set for the starts, and for the search that goes on from the best of them.
 FEW, MANY = 2_500, 20_000
 # Objectives evaluated in each search, at most; most end before.
-EVALUATIONS = 150
+EVALUATIONS, LAST_EVALUATIONS = 150, 500
 # A search ends where steps change the logarithm of the squared error by less.
-TOLERANCE = 1e-7
+TOLERANCE, LAST_TOLERANCE = 1e-7, 1e-10
 # Starts agree where they end within this share of the best error.
 AGREED = 0.01
-# Albedos are searched as log(albedo + this): zero is reached, and is not infinitely far away.
-DARKEST = 1e-5
-# Albedos at a start: towards zero the search has no slope to climb. From 0.001 up, a tenth of the starts with two lobes
-# ended with one of them black.
-START_ALBEDO = (0.1, 0.9)
-# Errors below this share of the values' own size are rounding, and not followed.
-ROUNDING = 1e-5
+# Errors below this share of the values' own size are hardly followed, by the starts and by the last search: where a
+# model can be exact, the logarithm of the error would have a cusp, at which searches creep.
+ROUNDING, LAST_ROUNDING = 1e-3, 1e-4
 # The value of parameters that are refused: worse than any logarithm of an error.
 REFUSED = 1e4
-# Step of the differences of a lobe in its scaled parameters; central ones are then right to some ten digits.
-STEP = 1e-5
 # How far starts are spread around the width that the material shows: a factor of e to this power either way.
 SPREAD = 1.2
 # Every so many-th start has another last lobe, where there is a choice.
@@ -61,7 +54,7 @@ class AnalyticFit:
     model: Analytic
     """Evaluates, samples, has a pdf."""
     name: str
-    parameters: MappingProxyType[str, float]
+    parameters: Mapping[str, float]
     """diffuse_r, diffuse_g, diffuse_b, specular_r ..., and the shape by the names of its class; of two lobes with _1
     (the narrower) and _2."""
     error: float
@@ -88,7 +81,7 @@ def fit_analytic(
     metric: str = "log_cosine_rms",
     progress: Callable[[float], None] | None = None,
 ) -> AnalyticFit:
-    """Return the model called ``name`` (see ``MODELS``) that is nearest to ``brdf`` by ``metric`` over both sample sets.
+    """Return the model called ``name`` (of ``MODELS``) that is nearest to ``brdf`` by ``metric`` over both sample sets.
 
     Pairs are drawn from the sets as for B-spline fits; those without data behind them have no weight. ``seed`` chooses
     the pairs and the ``starts``, of which the first is read off the material, and the others lie around it at random;
@@ -104,7 +97,7 @@ def fit_analytic(
         raise BvbError(f"seed is {shown(seed)}. Give a whole number from 0 up.")
     if not is_whole(starts) or not 1 <= starts <= 1000:
         raise BvbError(f"starts is {shown(starts)}. Give a whole number in 1 ... 1000.")
-    few = _Objective(drawn(brdf, FEW, seed), kind.lobes, loss)
+    few = Objective(drawn(brdf, FEW, seed), kind.lobes, loss, ROUNDING)
     if not len(few.pair):
         raise BvbError(
             "No data stand behind any of the pairs that were drawn. Give a measurement with more valid cells."
@@ -117,8 +110,8 @@ def fit_analytic(
     best = min(ends, key=lambda end: end.best)
     if not best.best < REFUSED:
         raise BvbError(f"{name} cannot follow this material from any start. Check its values, or try another model.")
-    many = _Objective(drawn(brdf, MANY, seed), best.objective.lobes, loss)
-    last = _Search(many, best.best_x).run()
+    many = Objective(drawn(brdf, MANY, seed), best.objective.lobes, loss, LAST_ROUNDING)
+    last = _Search(many, best.best_x).run(LAST_EVALUATIONS, LAST_TOLERANCE)
     if progress is not None:
         progress(1.0)
     errors = many.metrics(last.best_x)
@@ -126,111 +119,14 @@ def fit_analytic(
     # Logarithms of squares of the error, over both sets.
     agreed = sum(end.best - best.best <= 2 * math.log1p(AGREED) for end in ends)
     evaluations = sum(end.count for end in ends) + last.count
-    told = MappingProxyType(parameters)
-    return AnalyticFit(model, name, told, math.sqrt(errors[0] * errors[1]), errors, starts, agreed, evaluations)
-
-
-class _Objective:
-    """The logarithm of the squared error of x = log colours (1 + lobes, 3), then shapes; the mean over both sets."""
-
-    def __init__(self, reflectance: Reflectance, lobes: Sequence[Lobe], loss: Loss) -> None:
-        pairs = reflectance.pairs
-        self.pair = Pair(pairs.wi, pairs.wo)
-        self.f: Floats = np.ascontiguousarray(reflectance.f.T)
-        """(3, N)."""
-        self.cosines = pairs.wi[None, :, 2], pairs.wo[None, :, 2]
-        self.target = loss.transform(self.f, *self.cosines)
-        self.sets = [part for part in pairs.parts() if part.stop > part.start]
-        self.loss, self.lobes = loss, tuple(lobes)
-        size = float(np.sqrt(np.mean(self.target**2))) if self.target.size else 0.0
-        self.rounding = max(ROUNDING * size, 1e-150)
-
-    def of(self, lobes: Sequence[Lobe]) -> "_Objective":
-        """Return the same objective for other lobes."""
-        other = object.__new__(_Objective)
-        other.__dict__.update({k: v for k, v in self.__dict__.items() if k != "bounds"})
-        other.lobes = tuple(lobes)
-        return other
-
-    @cached_property
-    def bounds(self) -> tuple[Floats, Floats]:
-        """The least and the largest x: albedos from 0 to 1."""
-        colours = 3 * (1 + len(self.lobes))
-        each = [lobe.bounds for lobe in self.lobes]
-        low = np.concatenate([np.full(colours, math.log(DARKEST)), *(a for a, _ in each)])
-        return low, np.concatenate([np.full(colours, math.log1p(DARKEST)), *(b for _, b in each)])
-
-    def parts_of(self, x: Floats) -> tuple[Floats, list[Floats]]:
-        """Return colours (1 + lobes, 3) and the shapes of each lobe."""
-        colours = 3 * (1 + len(self.lobes))
-        ends = np.cumsum([colours, *(len(lobe.names) for lobe in self.lobes)])
-        shapes = [x[a:b] for a, b in zip(ends[:-1], ends[1:], strict=True)]
-        return np.clip(np.exp(x[:colours]) - DARKEST, 0.0, 1.0).reshape(-1, 3), shapes
-
-    def basis(self, shapes: Sequence[Floats]) -> Floats:
-        """Return what the colours are multiplied by (1 + lobes, N)."""
-        rows = [np.full(len(self.pair), 1 / np.pi)]
-        rows += [lobe.lobe(self.pair, x) for lobe, x in zip(self.lobes, shapes, strict=True)]
-        return np.stack(rows)
-
-    def __call__(self, x: Floats, slopes: Floats) -> float:
-        """Return the value at ``x`` and write its derivatives into ``slopes``, unless that is empty."""
-        colours, shapes = self.parts_of(x)
-        basis = self.basis(shapes)
-        f = colours.T @ basis
-        error = self.loss.transform(f, *self.cosines) - self.target
-        power = self.loss.power
-        # Powers below 2 have a cusp at zero, which is rounded off.
-        squared = error * error + self.rounding**2
-        size = squared if power == 2 else squared ** (power / 2)
-        means = [float(size[:, part].mean()) for part in self.sets]
-        value = float(np.mean(np.log(means)))
-        if slopes.size and math.isfinite(value):
-            slope = power * error if power == 2 else power * error * size / squared
-            slope *= self.loss.slope(f, *self.cosines)
-            for part, mean in zip(self.sets, means, strict=True):
-                slope[:, part] /= len(self.sets) * mean * 3 * (part.stop - part.start)
-            slopes[: colours.size] = ((basis @ slope.T) * (colours + DARKEST)).reshape(-1)
-            place = colours.size
-            for lobe, own, colour in zip(self.lobes, shapes, colours[1:], strict=True):
-                weighted = colour @ slope
-                for k in range(len(own)):
-                    step = np.zeros(len(own))
-                    step[k] = STEP
-                    change = lobe.lobe(self.pair, own + step) - lobe.lobe(self.pair, own - step)
-                    slopes[place] = weighted @ change / (2 * STEP)
-                    place += 1
-        # The error itself, whatever the power, squared.
-        return value * (2 / power) if power != 2 else value
-
-    def metrics(self, x: Floats) -> tuple[float, float]:
-        """Return the metric over each of the sets; a set without data is spoken for by the other one."""
-        colours, shapes = self.parts_of(x)
-        f = colours.T @ self.basis(shapes)
-        error = self.loss.transform(f, *self.cosines) - self.target
-        found = [self.loss.metric(self.loss.norm(error[:, part]), self.target[:, part]) for part in self.sets]
-        return float(found[0]), float(found[-1])
-
-    def coloured(self, shapes: Sequence[Floats]) -> Floats:
-        """Return x of the colours that are nearest to the material by least squares, weighted as the metric has it."""
-        basis = self.basis(shapes)
-        weight = self.loss.slope(self.f, *self.cosines)
-        colours = np.empty((len(basis), 3))
-        for c in range(3):
-            rows = basis * weight[c]
-            normal = rows @ rows.T
-            normal[np.diag_indices(len(basis))] *= 1 + 1e-6
-            normal[np.diag_indices(len(basis))] += np.finfo(float).tiny
-            colours[:, c] = np.linalg.solve(normal, rows @ (weight[c] * self.f[c]))
-        inside = np.clip(np.nan_to_num(colours), *START_ALBEDO)
-        return np.concatenate([np.log(inside + DARKEST).reshape(-1), *shapes])
+    return AnalyticFit(model, name, parameters, math.sqrt(errors[0] * errors[1]), errors, starts, agreed, evaluations)
 
 
 @dataclass
 class _Search:
     """One search from one start; it remembers the best itself."""
 
-    objective: _Objective
+    objective: Objective
     start: Floats
     best: float = REFUSED
     best_x: Floats = field(init=False)
@@ -242,7 +138,7 @@ class _Search:
         self.start = np.clip(self.start, low, high)
         self.best_x = self.start
 
-    def run(self) -> "_Search":
+    def run(self, evaluations: int = EVALUATIONS, tolerance: float = TOLERANCE) -> "_Search":
         """Search, and return itself."""
         import nlopt
 
@@ -261,13 +157,11 @@ class _Search:
         optimizer.set_min_objective(objective)
         optimizer.set_lower_bounds(low)
         optimizer.set_upper_bounds(high)
-        optimizer.set_ftol_abs(TOLERANCE)
-        optimizer.set_maxeval(EVALUATIONS)
-        try:
+        optimizer.set_ftol_abs(tolerance)
+        optimizer.set_maxeval(evaluations)
+        # Rounding ends a line search by an exception, of a type that depends on the version: the best is kept.
+        with suppress(Exception):
             optimizer.optimize(self.start)
-        except Exception:
-            # Rounding ends a line search by an exception, of a type that depends on the version: the best is kept.
-            pass
         if self.raised is not None:
             raise self.raised
         return self
@@ -289,7 +183,7 @@ class _Search:
 
 
 def _starts(
-    kind: Parametric, objective: _Objective, count: int, generator: np.random.Generator
+    kind: Parametric, objective: Objective, count: int, generator: np.random.Generator
 ) -> list[tuple[tuple[Lobe, ...], Floats]]:
     """Return ``count`` rows of lobes and where to start with them."""
     theta = _half_height(objective)
@@ -317,7 +211,7 @@ HALF_ANGLES = np.radians(90.0) * np.linspace(0, 0.85, 35) ** 2
 STEEPEST = math.cos(math.radians(60.0))
 
 
-def _half_height(objective: _Objective) -> float:
+def _half_height(objective: Objective) -> float:
     """Return the half angle (radians) at which the highlight falls to half of its height over the diffuse part."""
     pair = objective.pair
     seen = pair.cos_d > STEEPEST

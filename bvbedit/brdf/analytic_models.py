@@ -93,17 +93,17 @@ class BlinnPhongLobe(Lobe):
     def bounds(self) -> tuple[Floats, Floats]:
         return _bounds((2 / WIDTHS[1] ** 2, 2 / WIDTHS[0] ** 2))
 
-    def start(self, theta: float, growth: float) -> Floats:
+    def start(self, theta: float, _growth: float) -> Floats:
         return np.log([-math.log(2) / math.log(math.cos(theta))])
 
     def lobe(self, pair: Pair, x: Floats) -> Floats:
-        return BlinnPhong(1.0, *self.values(x)).lobe(pair)
+        return BlinnPhong(1.0, math.exp(x[0])).lobe(pair)
 
     def values(self, x: Floats) -> tuple[float, ...]:
         return (math.exp(x[0]),)
 
     def model(self, diffuse: Rgb, specular: Rgb, x: Floats) -> Analytic:
-        return BlinnPhong(specular, *self.values(x), diffuse)
+        return BlinnPhong(specular, math.exp(x[0]), diffuse)
 
     def width(self, x: Floats) -> float:
         return float(-x[0])
@@ -119,17 +119,17 @@ class WardLobe(Lobe):
     def bounds(self) -> tuple[Floats, Floats]:
         return _bounds(WIDTHS)
 
-    def start(self, theta: float, growth: float) -> Floats:
+    def start(self, theta: float, _growth: float) -> Floats:
         return np.log([math.tan(theta) / math.sqrt(math.log(2))])
 
     def lobe(self, pair: Pair, x: Floats) -> Floats:
-        return Ward(1.0, *self.values(x)).lobe(pair)
+        return Ward(1.0, math.exp(x[0])).lobe(pair)
 
     def values(self, x: Floats) -> tuple[float, ...]:
         return (math.exp(x[0]),)
 
     def model(self, diffuse: Rgb, specular: Rgb, x: Floats) -> Analytic:
-        return Ward(specular, *self.values(x), diffuse)
+        return Ward(specular, math.exp(x[0]), diffuse)
 
     def width(self, x: Floats) -> float:
         return float(x[0])

@@ -1,6 +1,7 @@
-"""Fits of analytic models: they find the parameters that made a material, the same ones each time, and fail in words."""
+"""Fits of analytic models: they find what made a material, the same each time, and fail in words."""
 
 import math
+import pickle
 
 import nlopt
 import numpy as np
@@ -28,6 +29,14 @@ from bvbedit.brdf.measured import MeasuredBrdf
 from bvbedit.brdf.metrics import estimate
 from tests.brdf.samples import Glossy
 from tests.spline.refusals import refusal
+
+
+@pytest.fixture(autouse=True)
+def few_pairs(monkeypatch):
+    """Materials without noise are told by few pairs of directions, which takes a tenth of the time."""
+    monkeypatch.setattr(analytic_fit, "FEW", 800)
+    monkeypatch.setattr(analytic_fit, "MANY", 3000)
+
 
 each_model = pytest.mark.parametrize("name", MODELS)
 
@@ -72,8 +81,8 @@ def rgb(name: str, colour) -> dict[str, float]:
 def test_parameters_of_one_lobe_are_found(kind, width):
     found = fit_analytic(lobe(kind, width, COLOURS[0], BODY), kind, starts=3)
     truth = rgb("diffuse", BODY) | rgb("specular", COLOURS[0]) | expected(kind, width)
-    assert dict(found.parameters) == pytest.approx(truth, rel=1e-3, abs=1e-5)
-    assert found.error < 1e-4
+    assert dict(found.parameters) == pytest.approx(truth, rel=1e-5)
+    assert found.error < 1e-7
     assert found.agreed >= 1
 
 
@@ -86,8 +95,8 @@ def test_parameters_of_two_lobes_are_found_the_narrow_one_first(kind, widths):
     told = rgb("diffuse", BODY)
     for n, (width, colour) in enumerate(zip(widths, COLOURS, strict=True), start=1):
         told |= rgb(f"specular_{n}", colour) | expected(kind, width, f"_{n}")
-    assert dict(found.parameters) == pytest.approx(told, rel=0.01, abs=1e-4)
-    assert found.error < 1e-4
+    assert dict(found.parameters) == pytest.approx(told, rel=1e-4)
+    assert found.error < 1e-7
 
 
 def test_a_lobe_back_to_the_light_is_found():
@@ -104,7 +113,7 @@ def test_the_model_is_what_its_numbers_say(name):
     assert found.name == name
     assert found.parameter_count == len(found.parameters) == MODELS[name].parameter_count
     told = estimate(found.model, Glossy(0.2))
-    assert found.errors == pytest.approx((told.grid.log_cosine_rms, told.nodes.log_cosine_rms), rel=0.05)
+    assert found.errors == pytest.approx((told.grid.log_cosine_rms, told.nodes.log_cosine_rms), rel=0.1)
     assert found.error == pytest.approx(math.sqrt(math.prod(found.errors)))
     wo = spherical(0.6, 0.3)
     wi, density, weight = found.model.sample(wo, np.random.default_rng(1).random((4000, 2)))
@@ -124,7 +133,7 @@ def test_two_lobes_are_no_worse_than_one():
 @pytest.mark.parametrize("name", ["ward", "lafortune 2"])
 def test_the_same_seed_gives_the_same_model(name):
     a, b = (fit_analytic(Glossy(0.2), name, seed=5, starts=3) for _ in range(2))
-    assert a == b
+    assert a == b == pickle.loads(pickle.dumps(a))
     other = fit_analytic(Glossy(0.2), name, seed=6, starts=3)
     assert other != a
     assert other.error == pytest.approx(a.error, rel=0.05)
@@ -190,7 +199,7 @@ class _Broken(Brdf):
     def __init__(self, value: float, trusted: bool) -> None:
         self.value, self.trusted = value, trusted
 
-    def _evaluate(self, wi, wo):
+    def _evaluate(self, wi, _wo):
         return np.full((len(wi), 3), self.value), np.full(len(wi), self.trusted)
 
 
@@ -227,7 +236,7 @@ def test_a_search_that_nlopt_ends_by_an_exception_keeps_its_best(monkeypatch):
 
 
 def test_values_that_are_no_numbers_are_refused_and_the_rest_searched(monkeypatch):
-    whole = analytic_fit._Objective.__call__
+    whole = analytic_fit.Objective.__call__
     calls = 0
 
     def sometimes(self, x, slopes):
@@ -235,7 +244,7 @@ def test_values_that_are_no_numbers_are_refused_and_the_rest_searched(monkeypatc
         calls += 1
         return math.nan if calls % 7 == 3 else whole(self, x, slopes)
 
-    monkeypatch.setattr(analytic_fit._Objective, "__call__", sometimes)
+    monkeypatch.setattr(analytic_fit.Objective, "__call__", sometimes)
     assert fit_analytic(Ward(0.2, 0.15, 0.3), "ward", starts=4).error < 0.01
 
 
@@ -243,6 +252,6 @@ def test_an_interruption_is_passed_on(monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(analytic_fit._Objective, "__call__", interrupted)
+    monkeypatch.setattr(analytic_fit.Objective, "__call__", interrupted)
     with pytest.raises(KeyboardInterrupt):
         fit_analytic(Lambert(0.5), "ward", starts=1)
