@@ -167,6 +167,19 @@ def test_sample_list_and_make(run, tmp_path):
     assert one_object(out)["chart"] == "rusinkiewicz"
 
 
+def test_all_samples_of_the_database_are_made_and_kept(run, tmp_path):
+    options = ["--all", tmp_path / "db", "--count", 1, "--json"]
+    status, out, err = run("sample", "make", *options)
+    told = one_object(out)
+    assert (status, err, told["made"], told["kept"]) == (0, "", 1, 0)
+    assert told["bytes"] == 34_992_012
+    (made,) = told["materials"]
+    assert Path(made["file"]).stat().st_size == 34_992_012
+    told = one_object(run("sample", "make", *options)[1])
+    assert (told["made"], told["kept"], told["materials"][0]["status"]) == (0, 1, "kept")
+    assert "db-000" in run("sample", "list")[1]
+
+
 BAD = [
     (["fit", "{here}/missing.binary", "{out}/m.bvb"], "missing.binary"),
     (["fit", "{here}", "{out}/m.bvb"], "folder"),
@@ -189,6 +202,12 @@ BAD = [
     (["sample", "make", "unobtainium", "{out}/u.binary"], "unobtainium"),
     (["sample", "make", "teflon", "{out}/t.binary", "--noise", "7"], "7"),
     (["sample", "make", "teflon", "{out}/t.binary", "--grid", "paper"], "paper"),
+    (["sample", "make", "db-000-chrome", "{out}/t.binary"], "db-000-matte"),
+    (["sample", "make", "teflon"], "Nothing to make"),
+    (["sample", "make", "teflon", "{out}/t.binary", "--jobs", "2"], "--all"),
+    (["sample", "make", "teflon", "--all", "{out}"], "each has its own"),
+    (["sample", "make", "--all", "{out}/db", "--count", "0"], "count is 0"),
+    (["sample", "make", "--all", "{out}/db", "--jobs", "999"], "999"),
     (["compare", "{here}/satin.bvb", "{here}/nothing.bvb"], "nothing.bvb"),
     (["export", "{here}/satin.bvb", "{out}/t.csv"], ".csv"),
     (["view", "{here}/satin.binary", "--screenshot", "{out}/p.png"], "Fit it first"),
