@@ -87,6 +87,9 @@ def fit_analytic(
     the pairs and the ``starts``, of which the first is read off the material, and the others lie around it at random;
     the same seed gives the same model. ``progress`` is called with the share done.
 
+    Each albedo stays within 1, as a model that is to be rendered needs it. Free ones would follow grazing highlights
+    further: a satin paint with "ggx" to 0.036 in place of 0.057, and reflect more than arrives beyond 80 degrees.
+
     Raises BvbError for no Brdf, an unknown name or metric, a seed that is no whole number >= 0, starts that are none in
     1 ... 1000, a material without data behind any pair, and one that no start can follow.
     Source: A. Ngan, F. Durand, W. Matusik, "Experimental Analysis of BRDF Models", EGSR 2005.
