@@ -30,7 +30,7 @@ __all__ = ["MODELS", "AnalyticFit", "fit_analytic"]
 # chrome took half the time and were as good to 1 %, but the error told by the pairs was up to 11 % off; now it is 2 %.
 FEW, MANY = 2_500, 60_000
 # Objectives evaluated in each search, at most; most end before.
-EVALUATIONS, LAST_EVALUATIONS = 150, 500
+EVALUATIONS, LAST_EVALUATIONS = 150, 300
 # A search ends where steps change the logarithm of the squared error by less.
 TOLERANCE, LAST_TOLERANCE = 1e-7, 1e-10
 # Starts agree where they end within this share of the best error.
