@@ -29,7 +29,7 @@ def study(
     Parameters
     ----------
     materials
-        Files, folders with files, or names of sample materials (bvbedit sample list).
+        Files, folders with files, names of sample materials (bvbedit sample list), or database: a hundred generated ones.
     out
         The folder that the results go to: results.csv, and a file for each cell, by which it goes on.
     plan

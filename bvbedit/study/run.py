@@ -15,6 +15,7 @@ from typing import Any
 
 import tomlkit
 
+from bvbedit.brdf.database import Generated, database
 from bvbedit.brdf.materials import MATERIALS, material_named
 from bvbedit.edit.recipe import Source
 from bvbedit.errors import BvbError
@@ -27,6 +28,8 @@ from bvbedit.threads import one_matrix_thread
 
 SUFFIXES = (".binary", ".bsdf", ".npz")
 PLAN, VERSIONS, CELLS = "plan.toml", "versions.json", "cells"
+# Stands for all materials of the generated database.
+DATABASE = "database"
 # Seconds to wait for a scheduler.
 PATIENCE = 10
 
@@ -34,7 +37,7 @@ Told = Callable[[int, int, dict[str, Any]], object]
 
 
 def materials_of(paths: Sequence[Path]) -> dict[str, Source]:
-    """Return the materials that paths name, by names of their own: files, folders with files, and sample materials.
+    """Return the materials that paths name, by names of their own: files, folders, samples, or ``database``.
 
     Raises BvbError for a path that is nothing of it, a folder without materials, and none at all.
     """
@@ -47,6 +50,8 @@ def materials_of(paths: Sequence[Path]) -> dict[str, Source]:
             sources += [Source(file=file) for file in inside]
         elif path.exists():
             sources.append(Source(file=path))
+        elif str(path) == DATABASE:
+            sources += [_sample(material.name) for material in database()]
         elif len(path.parts) == 1 and not path.suffix:
             sources.append(_sample(str(path)))
         else:
@@ -62,10 +67,14 @@ def materials_of(paths: Sequence[Path]) -> dict[str, Source]:
 
 def _sample(name: str) -> Source:
     try:
-        material_named(name)
+        material = material_named(name)
     except BvbError:
         known = ", ".join(MATERIALS)
-        raise BvbError(f"{name} is no file, no folder and no sample material. Samples: {known}.") from None
+        raise BvbError(
+            f"{name} is no file, no folder and no sample material. Samples: {known}, and {DATABASE} for a hundred more."
+        ) from None
+    if isinstance(material, Generated):
+        return Source(sample=name, noise=material.noise, seed=material.noise_seed)
     return Source(sample=name)
 
 
@@ -239,7 +248,7 @@ def _told(plan: Plan, materials: dict[str, Source]) -> dict[str, Any]:
 
 
 def _sum(source: Source) -> str:
-    return str(source) if source.file is None else _bytes_sum(source.file)
+    return repr(source) if source.file is None else _bytes_sum(source.file)
 
 
 def _bytes_sum(path: Path) -> str:

@@ -36,6 +36,7 @@ class SceneArea:
         plotter: "Plotter",
         clicked: Callable[[float, float, bool], object],
         resized: Callable[[], object],
+        touched: Callable[[], object] = lambda: None,
     ) -> None:
         from trame_rca.rca import VtkRemoteControlledArea
 
@@ -45,7 +46,7 @@ class SceneArea:
         window.SetMultiSamples(0)
         self._render_window = window
         self._window = VtkRemoteControlledArea(self._render_window)
-        self._clicked, self._resized = clicked, resized
+        self._clicked, self._resized, self._touched = clicked, resized, touched
         self._pressed: tuple[float, float] | None = None
         self._moved = True
         self.drawn = 0
@@ -75,6 +76,7 @@ class SceneArea:
     def process_interaction_event(self, event: dict[str, Any]) -> None:
         """Turn the scene, or report a click with its place and whether the shift key was down."""
         self.moved()
+        self._touched()
         kind = event.get("type")
         if not isinstance(kind, str):
             return

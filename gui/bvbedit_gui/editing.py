@@ -43,7 +43,7 @@ class Editing:
         self.state = viewer.state
         self.state.update({**STARTS, **starts(), **region_starts()})
         self.pending: tuple[Document, Edit, SplineBrdf] | None = None
-        self.queue = Latest(viewer.pool, self._trial_failed)
+        self.queue = Latest(viewer.pool, self._trial_failed, lambda: viewer.preview.hold())
         # Steps through the history are taken one after the other, however fast the keys are.
         self._stepping = asyncio.Lock()
         self.state.change("op", "live")(self._op_changed)

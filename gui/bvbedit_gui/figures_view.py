@@ -24,6 +24,8 @@ STARTS: dict[str, Any] = {
     "figure_svg": "",
     "figure_rows": [],
 }
+# Seconds that figures wait for pictures, which eyes follow first.
+REST = 0.12
 SMALLEST, LARGEST = (380, 220), (1600, 1200)
 
 
@@ -34,7 +36,7 @@ class FiguresView:
         self._viewer = viewer
         self.state = viewer.state
         self.state.update(STARTS)
-        self.queue = viewer.latest("figures")
+        self.queue = viewer.latest("figures", REST)
         self.state.change("figure", "line_axis", "line_scale", "probe", "figure_size")(lambda **_: self.refresh())
 
     def synchronise(self) -> None:

@@ -9,9 +9,17 @@ from typing import Any
 class Latest:
     """Does one thing at a time in an executor; of what is asked for meanwhile only the newest is done."""
 
-    def __init__(self, executor: Executor, failed: Callable[[Exception], object]) -> None:
+    def __init__(
+        self,
+        executor: Executor,
+        failed: Callable[[Exception], object],
+        asked: Callable[[], object] = lambda: None,
+        rest: float = 0.0,
+    ) -> None:
         self._executor = executor
-        self._failed = failed
+        self._failed, self._asked = failed, asked
+        # Seconds to wait before each piece of work: what is less urgent leaves the processors to what is more.
+        self._rest = rest
         self._next: tuple[Callable[[], Any], Callable[[Any], object]] | None = None
         self._task: asyncio.Task[None] | None = None
 
@@ -28,8 +36,9 @@ class Latest:
     def ask(self, work: Callable[[], Any], then: Callable[[Any], object]) -> None:
         """Do ``work`` in the executor, then hand its result to ``then`` in the event loop, unless something newer came.
 
-        What ``work`` raises is handed to ``failed``.
+        What ``work`` raises is handed to ``failed``; ``asked`` is called at once.
         """
+        self._asked()
         self._next = work, then
         if not self.busy:
             self._task = asyncio.get_running_loop().create_task(self._run())
@@ -46,6 +55,8 @@ class Latest:
     async def _run(self) -> None:
         loop = asyncio.get_running_loop()
         while self._next is not None:
+            if self._rest:
+                await asyncio.sleep(self._rest)
             (work, then), self._next = self._next, None
             try:
                 result = await loop.run_in_executor(self._executor, work)

@@ -40,6 +40,8 @@ class LobeScene:
         self._other.prop.interpolation = "Phong"
         self._width = 1.3
         self._view = "oblique"
+        # What is written at the rings and where: to write anew takes as long as to draw.
+        self._written: dict[int, tuple[object, ...]] = {}
 
     def _actor(self, name: str, **style: Any) -> "Actor":
         import pyvista as pv
@@ -104,8 +106,11 @@ class LobeScene:
             # Front left: beside the lobe, and the rings are well apart there.
             at = radius * spherical(np.pi / 2, np.radians(-140.0))
             hidden = lobes.hides(mesh, at, np.subtract(LOBE_EYE, LOBE_FOCUS))
-            places = (at - [shift / 2, 0.0, 0.0])[None]
-            write_at(self.plotter, places, [] if hidden else [number(length)], CHALK, small, f"ring {n}")
+            place = at - [shift / 2, 0.0, 0.0]
+            told = ("", *place) if hidden else (number(length), *place)
+            if self._written.get(n) != told:
+                self._written[n] = told
+                write_at(self.plotter, place[None], [told[0]] if told[0] else [], CHALK, small, f"ring {n}")
 
     def _directions(self, theta_i: float, shift: float) -> None:
         incident, mirror = spherical(theta_i, np.pi), spherical(theta_i, 0.0)

@@ -36,7 +36,7 @@ class LobeView:
         self.plotter = pv.Plotter(off_screen=True, window_size=[480, 360])
         self.scene = LobeScene(self.plotter, TEXT_SIZE)
         self.scene.look_from("oblique")
-        self.area = SceneArea(self.plotter, lambda *_: None, self.scene.resized)
+        self.area = SceneArea(self.plotter, lambda *_: None, self.scene.resized, lambda: viewer.preview.hold())
         self.send: Any = lambda: None
         self.state.change("theta_i", "lobe_scale", "lobe_beside")(lambda **_: self.refresh())
 

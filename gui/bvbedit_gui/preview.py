@@ -7,12 +7,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Condition, Thread
-from typing import Literal
+from time import monotonic, sleep
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bvbedit.brdf.base import Brdf
+from bvbedit.brdf.geometry import Bools, Floats
 from bvbedit.errors import BvbError
 from bvbedit.render.image_metrics import PictureComparison, compare_pictures
 from bvbedit.render.integrator import Picture, render_passes
@@ -27,6 +29,8 @@ BETTER = 2
 # Differences are amplified until the largest is white, but no more than this: beyond, it is noise of the last bit.
 LARGEST_GAIN = 64
 GAP = 4
+# Seconds that later passes rest after something was moved, and between looks at whether that is over.
+HOLD, PAUSE = 0.4, 0.02
 
 
 @dataclass(frozen=True)
@@ -52,6 +56,21 @@ class Seen:
     """The standard error over the mean; infinite where it is not known yet."""
 
 
+class Patient(Brdf):
+    """A material that waits before it is evaluated, as long as ``wait`` does: in all threads that render it."""
+
+    def __init__(self, material: Brdf, wait: Callable[[], object]) -> None:
+        self._material, self._wait = material, wait
+        self.reliable_elevation = material.reliable_elevation
+
+    def evaluate_unit(self, wi: Floats, wo: Floats) -> tuple[Floats, Bools]:
+        self._wait()
+        return self._material.evaluate_unit(wi, wo)
+
+    def _evaluate(self, wi: Floats, wo: Floats) -> tuple[Floats, Bools]:
+        return self._material._evaluate(wi, wo)
+
+
 class Overtaken(Exception):  # noqa: N818  (it is no error: something newer was asked for)
     """What is being made is not wanted any more."""
 
@@ -67,6 +86,7 @@ class Preview:
         self._wish: Wish | None = None
         self._done: Wish | None = None
         self._ended = False
+        self._held = 0.0
         self._changed = Condition()
         self._prepared: dict[tuple[str, int, int], PreparedScene] = {}
         self._thread = Thread(target=self._work, name="preview", daemon=True)
@@ -77,6 +97,10 @@ class Preview:
         with self._changed:
             self._wish = wish
             self._changed.notify_all()
+
+    def hold(self) -> None:
+        """Let later passes rest a moment: who moves something waits for another picture."""
+        self._held = monotonic() + HOLD
 
     @property
     def busy(self) -> bool:
@@ -126,16 +150,22 @@ class Preview:
         if not self._passes:
             return
 
-        def go_on(_: float) -> None:
+        def go_on(_: float = 0.0) -> None:
             self._check(wish)
+            while monotonic() < self._held:
+                sleep(PAUSE)
+                self._check(wish)
 
-        options = {"width": wish.side, "height": wish.side, "spp": wish.last, "progress": go_on}
-        density = wish.model.density
-        self._check(wish)
-        ours = render_passes(wish.model, wish.scene, density=density, **options)  # type: ignore[arg-type]
-        theirs = None
-        if wish.other is not None:
-            theirs = render_passes(wish.other, wish.scene, density=density, **options)  # type: ignore[arg-type]
+        go_on()
+        options: dict[str, Any] = {
+            "width": wish.side,
+            "height": wish.side,
+            "spp": wish.last,
+            "progress": go_on,
+            "density": wish.model.density,
+        }
+        ours = render_passes(Patient(wish.model, go_on), wish.scene, **options)
+        theirs = None if wish.other is None else render_passes(Patient(wish.other, go_on), wish.scene, **options)
         for estimate in ours:
             beside = None if theirs is None else next(theirs).picture
             if estimate.samples > BETTER:

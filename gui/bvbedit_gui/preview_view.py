@@ -38,6 +38,10 @@ class PreviewView:
         self.state.change("layout")(lambda **_: self.refresh())
         self.state.change("exposure")(lambda **_: self.compose())
 
+    def hold(self) -> None:
+        """Let later passes rest a moment."""
+        self._preview.hold()
+
     @property
     def first_pass_due(self) -> bool:
         """Whether the newest wish has no picture yet."""

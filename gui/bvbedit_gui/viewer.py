@@ -128,9 +128,9 @@ class Viewer:
         self.preview.refresh()
         self.figures.refresh()
 
-    def latest(self, place: str) -> Latest:
+    def latest(self, place: str, rest: float = 0.0) -> Latest:
         """Return a queue of length one in the viewer's threads, whose failures are told at ``place``."""
-        return Latest(self.pool, lambda error: self.tell(place, error))
+        return Latest(self.pool, lambda error: self.tell(place, error), lambda: self.preview.hold(), rest)
 
     def tell(self, place: str, error: Exception | None) -> None:
         """Show why something could not be done where it was asked for, or take the words away."""

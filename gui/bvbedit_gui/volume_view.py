@@ -81,7 +81,7 @@ class VolumeView:
         self.plotter = pv.Plotter(off_screen=True, window_size=[640, 480])
         self.scene = VolumeScene(self.plotter, theme, TEXT_SIZE)
         self.scene.look_from("oblique")
-        self.area = SceneArea(self.plotter, viewer_clicked(viewer), self.scene.resized)
+        self.area = SceneArea(self.plotter, viewer_clicked(viewer), self.scene.resized, lambda: viewer.preview.hold())
         # The page's view, once there is a page: asked to send a picture.
         self.send: Any = lambda: None
         self.field: volume.Field | None = None
@@ -197,6 +197,7 @@ class VolumeView:
         """Show the surfaces of the values that are asked for."""
         if self.field is None:
             return
+        self._viewer.preview.hold()
         values = self.iso_values
         self.state.iso_text = ", ".join(number(v) for v in values)
         opacity = real(self.state.opacity, 0.5, 0.02, 1.0)
