@@ -29,14 +29,14 @@ def study(
     Parameters
     ----------
     materials
-        Files, folders with files, names of sample materials (bvbedit sample list), or database: a hundred generated ones.
+        Files, folders with files, names of sample materials (bvbedit sample list), or database: a hundred generated.
     out
         The folder that the results go to: results.csv, and a file for each cell, by which it goes on.
     plan
         A plan in TOML, in place of 40 configurations: the paper's, both charts over bytes, degrees, precisions, and
         analytic models.
     jobs
-        Processes that share the work. Each takes some 700 MB with MERL files.
+        Processes that share the work. Each takes about 1 GB with MERL files.
     dask
         The address of a Dask scheduler whose workers share the work instead.
     as_json

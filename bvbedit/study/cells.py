@@ -5,7 +5,7 @@ A function of what pickles, and deterministic but for times, so that any process
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -14,6 +14,7 @@ import numpy as np
 
 from bvbedit.brdf.base import Brdf
 from bvbedit.brdf.geometry import Floats, spherical
+from bvbedit.brdf.highlight import highlight_width
 from bvbedit.brdf.metrics import compare, estimate, lengths_on_grid
 from bvbedit.edit.recipe import Source
 from bvbedit.errors import BvbError
@@ -57,6 +58,11 @@ class Reference:
         if key not in self._pictures:
             self._pictures[key] = render(self.brdf, scene, width=side, height=side, spp=spp, density=self.brdf.density)
         return self._pictures[key]
+
+    @cached_property
+    def highlight(self) -> float:
+        """The half-width of its highlight in degrees."""
+        return highlight_width(self.brdf)
 
     def lengths(self, stride: int) -> tuple[float, float]:
         """Return the largest and the mean length of its reflectance over the paper's grid, in 1/sr."""
@@ -155,6 +161,7 @@ def _errors(model: Brdf, reference: Reference, stride: int) -> dict[str, Any]:
     for name in ("e_max", "e_avg", "e_max_45", "e_avg_45"):
         row[name] = _real(getattr(found.paper, name))
     row["r_max"], row["r_avg"] = reference.lengths(stride)
+    row["highlight"] = reference.highlight
     row["albedo_error"] = _real(reference.albedo_error(model))
     return row
 

@@ -47,7 +47,7 @@ def frontier_plots(table: Table) -> list[Plot | Missing]:
         for n, page in enumerate(pages, 1):
             part = f", {n} of {len(pages)}" if len(pages) > 1 else ""
             name = f"materials-{trade.name}" + (f"-{n}" if len(pages) > 1 else "")
-            words = "The same for each material by itself, sorted by class and r_max / r_avg."
+            words = "The same for each material by itself, sorted by class and the width of the highlight."
             then.append(_plot(table, trade, name, f"Frontier per material: {trade.title}{part}", page, words))
     return first + then
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from bvbedit.errors import BvbError
 from bvbedit.io.files import make_folder, reading, replacing
-from bvbedit.study.classes import HOW, class_of, contrasts, groups
+from bvbedit.study.classes import HOW, class_of, groups, highlights
 from bvbedit.study.figures import figures
 from bvbedit.study.frontier import HOW_KNEE
 from bvbedit.study.frontier_plots import class_clouds
@@ -97,13 +97,13 @@ def _page(
         "Rendering”, Transactions of the Society of CAD/CAM Engineers 13(6), 2008.",
         HOW_KNEE,
     ]
-    ratios = contrasts(table)
+    widths = highlights(table)
     rows = [
-        (material, label if material not in ratios else class_of(ratios[material]), ratios.get(material))
+        (material, label if material not in widths else class_of(widths[material]), widths.get(material))
         for label, names in groups(table).items()
         for material in names
     ]
-    told = table_html(Numbers(("material", "class", "r_max / r_avg"), tuple(rows)))
+    told = table_html(Numbers(("material", "class", "half-width of the highlight, degrees"), tuple(rows)))
     counts = ", ".join(f"{len(names)} {label}" for label, names in groups(table).items())
     tables = {
         "Classes of materials": (f"{counts}. {HOW}", folded("The materials", told)),

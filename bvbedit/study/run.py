@@ -51,7 +51,7 @@ def materials_of(paths: Sequence[Path]) -> dict[str, Source]:
         elif path.exists():
             sources.append(Source(file=path))
         elif str(path) == DATABASE:
-            sources += [_sample(material.name) for material in database()]
+            sources += [_sample(name) for name in database()]
         elif len(path.parts) == 1 and not path.suffix:
             sources.append(_sample(str(path)))
         else:

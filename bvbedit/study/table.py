@@ -64,6 +64,7 @@ class Row:
     e_avg_45: float | None = number("1/sr", "mean length of the RGB error at theta_i = 45 degrees")
     r_max: float | None = number("1/sr", "largest length of the material's own RGB vector over the same nodes")
     r_avg: float | None = number("1/sr", "mean length of the material's own RGB vector over the same nodes")
+    highlight: float | None = number("degrees", "half-width of the material's highlight; 90 where it has none")
     albedo_error: float | None = number("", "largest difference of directional albedo over elevations and channels")
     fit_seconds: float | None = number("s", "time to fit", is_time=True)
     evaluations_per_second: float | None = number(

@@ -8,8 +8,9 @@ SIDES = (4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24)
 BYTES = tuple(1024 * 2**k for k in range(8))
 ANALYTIC = {"lambert": (3, 3.0), "phong": (7, 1.4), "ward": (8, 1.2), "ggx": (8, 1.0), "ggx 2": (13, 0.7)}
 NAMES = ("paper-white", "teflon", "satin", "car-paint", "gold-paint", "chrome")
-# Of the classes: r_max / r_avg, how hard it is for the paper's nets, and for nets that follow the highlight.
-KINDS = ((40.0, 0.1, 0.3), (2000.0, 1.0, 0.6), (9000.0, 20.0, 1.5))
+# Of the classes: r_max / r_avg, the half-width of the highlight in degrees, how hard it is for the paper's nets, and for
+# nets that follow the highlight.
+KINDS = ((40.0, 90.0, 0.1, 0.3), (2000.0, 4.0, 1.0, 0.6), (9000.0, 0.3, 20.0, 1.5))
 CLASS_OF = (0, 0, 1, 1, 0, 2)
 
 
@@ -20,12 +21,21 @@ def made_table(materials=6, *, seed=1, scenes=("sphere",), sides=SIDES, sizes=BY
     for m in range(materials):
         name = NAMES[m] if m < len(NAMES) else f"material-{m:03d}"
         kind = CLASS_OF[m % len(CLASS_OF)]
-        contrast, hard, own = KINDS[kind]
+        contrast, width, hard, own = KINDS[kind]
         contrast *= rng.lognormal(0, 0.3)
         hard, own, bright = hard * rng.lognormal(0, 0.5), own * rng.lognormal(0, 0.5), rng.lognormal(-1.5, 0.6)
 
         def cell(
-            configuration, series, error, file_bytes, rng=rng, name=name, bright=bright, contrast=contrast, **more
+            configuration,
+            series,
+            error,
+            file_bytes,
+            rng=rng,
+            name=name,
+            bright=bright,
+            contrast=contrast,
+            width=width,
+            **more,
         ):
             if rng.random() < failing:
                 return Row(
@@ -58,6 +68,7 @@ def made_table(materials=6, *, seed=1, scenes=("sphere",), sides=SIDES, sizes=BY
                 "e_avg_45": bright * noisy * 0.15,
                 "r_max": bright * contrast,
                 "r_avg": bright,
+                "highlight": width,
                 "albedo_error": noisy * 0.1,
                 "condition": 10.0 * rng.lognormal(0, 1),
                 "fit_seconds": 0.5 + 1e-5 * file_bytes,

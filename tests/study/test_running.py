@@ -7,6 +7,7 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import bvbedit
@@ -162,6 +163,15 @@ def test_what_is_no_material_is_told(tmp_path, monkeypatch, paths, word):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(BvbError, match=word):
         materials_of([Path(path) for path in paths])
+
+
+def test_the_database_is_measured_with_the_noise_of_each():
+    sources = materials_of([Path("database")])
+    assert len(sources) == 100
+    assert len({(source.noise, source.seed) for source in sources.values()}) == 100
+    name, source = next(iter(sources.items()))
+    assert name == source.sample
+    np.testing.assert_array_equal(source.read().values, material_named(name).measured("merl").values)
 
 
 def test_materials_of_one_name_are_told_apart(folder, tmp_path):

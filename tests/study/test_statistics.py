@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bvbedit.study.classes import CLASSES, class_of, classes, contrast, groups
+from bvbedit.study.classes import CLASSES, class_of, classes, groups, highlight
 from bvbedit.study.plots import agreement
 from bvbedit.study.statistics import median, pearson, ranks, spearman
 from bvbedit.study.table import Row, Table
@@ -31,20 +31,17 @@ def test_ranks_of_ties_are_their_mean(rng):
     assert pearson(x, np.exp(5 * x)) < 0.9
 
 
-def cell(material, r_max, r_avg, **more):
-    given = {"configuration": "c", "series": "s", "kind": "spline", "status": "done"} | more
-    return Row(material=material, r_max=r_max, r_avg=r_avg, **given)
+def cell(material, width):
+    return Row(material=material, highlight=width, configuration="c", series="s", kind="spline", status="done")
 
 
-def test_a_class_follows_from_the_largest_by_the_mean():
+def test_a_class_follows_from_the_width_of_the_highlight():
     # As measured: white paper, satin, chrome.
-    table = Table(
-        (cell("chrome", 7122.0, 0.9), cell("paper", 5.9, 0.48), cell("satin", 1145.0, 0.57), cell("?", None, 1.0))
-    )
+    table = Table((cell("chrome", 0.07), cell("paper", 90.0), cell("satin", 2.3), cell("?", None)))
     assert classes(table) == {"diffuse": ("paper",), "glossy": ("satin",), "mirror-like": ("chrome",)}
     assert groups(table)["class unknown"] == ("?",)
-    assert class_of(1.0) == "diffuse"
-    assert contrast([cell("black", 0.0, 0.0)]) is None
+    assert class_of(10.0) == "diffuse"
+    assert highlight([cell("?", None)]) is None
     assert tuple(classes(made_table())) == CLASSES
     assert median([3, 1, 2]) == 2
 

@@ -40,6 +40,7 @@ SPECIFIED = [
     "e_avg_45",
     "r_max",
     "r_avg",
+    "highlight",
     "albedo_error",
     "sphere_mae",
     "sphere_pae",
@@ -138,7 +139,7 @@ def test_a_table_without_cells_is_a_table(written):
         (("e_max,", "e_avg,"), "line 1: column 'e_avg' is there twice."),
         (("chrome", '"chr\x00'), "line 2: "),
         (("chrome", '"chrome'), "line 2: unexpected end"),
-        (("spline,", "spline,,"), "line 2, column 'evaluations_per_second': 32 values for 31 columns."),
+        (("spline,", "spline,,"), "line 2, column 'evaluations_per_second': 33 values for 32 columns."),
     ],
 )
 def test_a_mistake_is_told_with_its_line_and_column(written, change, words):
