@@ -8,8 +8,8 @@ SIDES = (4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24)
 BYTES = tuple(1024 * 2**k for k in range(8))
 ANALYTIC = {"lambert": (3, 3.0), "phong": (7, 1.4), "ward": (8, 1.2), "ggx": (8, 1.0), "ggx 2": (13, 0.7)}
 NAMES = ("paper-white", "teflon", "satin", "car-paint", "gold-paint", "chrome")
-# Of the classes: r_max / r_avg, the half-width of the highlight in degrees, how hard it is for the paper's nets, and for
-# nets that follow the highlight.
+# Of the classes: r_max / r_avg, the half-width of the highlight in degrees, how hard it is for the paper's nets, and
+# for nets that follow the highlight.
 KINDS = ((40.0, 90.0, 0.1, 0.3), (2000.0, 4.0, 1.0, 0.6), (9000.0, 0.3, 20.0, 1.5))
 CLASS_OF = (0, 0, 1, 1, 0, 2)
 
