@@ -25,7 +25,7 @@ from bvbedit_gui.volume_scene import HALVES, LINES, VIEWS
 from bvbedit_gui.volume_view import TEXT_SIZE
 
 # Milliseconds that anything in the page may take on a slow machine.
-PATIENCE = 60_000
+PATIENCE = 240_000
 ARGUMENTS = [
     *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"),
     *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
