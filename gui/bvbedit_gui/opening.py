@@ -65,9 +65,7 @@ class Opening:
         """The name of the file that is worked on, if something of it was kept when the viewer ended before."""
         session = self._viewer.session
         path = None if session.current is None else session.here.path
-        if path is None or path in session.keeping or not autosave_path(path).exists():
-            return ""
-        return session.places.shown(path)
+        return session.places.shown(path) if path is not None and session.was_kept(path) else ""
 
     def open_sample(self, name: str) -> None:
         """Open a sample material, to be fitted."""

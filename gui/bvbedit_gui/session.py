@@ -206,9 +206,14 @@ class Session:
         if place is not None:
             discard_autosave(place)
 
+    def was_kept(self, path: Path) -> bool:
+        """Return whether something of a file was kept when the viewer ended before, and can be recovered."""
+        kept = autosave_path(path)
+        return kept.exists() and path not in self.keeping and self.places.allowed(kept)
+
     def _keeping_place(self, opened: Opened) -> Path:
         """Return the file, which need not exist, beside which a material is kept: one that no other is kept beside."""
-        if opened.path is not None and not autosave_path(opened.path).exists():
+        if opened.path is not None and not self.was_kept(opened.path):
             return opened.path
         # Something of the file was kept before, and is still to be recovered.
         taken = self.keeping | {o.path for _, o in self}

@@ -21,7 +21,7 @@ import bvbedit
 from bvbedit.brdf.analytic import GGX, Schlick
 from tests.gui.browser import Desk, chromium, missing, served
 
-STEPS = 60
+STEPS = 30
 # Frames are counted over so many seconds of dragging.
 DRAGGING = 4.0
 
