@@ -169,8 +169,10 @@ def use_at_random(desk: Desk, minutes: float, seed: int = 0) -> int:
         desk.click(rng.choice(("look 0", "look 1", "look 2", "look oblique", "lobe side", "lobe oblique")))
 
     def edit() -> None:
-        if desk.state("edit_pending"):
-            desk.click(rng.choice(("apply", "cancel")))
+        # By the time that it is clicked the edit may be done or gone, and the button with it.
+        button = desk.mark(rng.choice(("apply", "cancel")))
+        if button.is_enabled():
+            button.dispatch_event("click")
 
     def back() -> None:
         desk.page.evaluate("name => window.trame.trigger(name)", rng.choice(("undo", "undo", "redo")))
