@@ -13,6 +13,9 @@ from bvbedit.spline.arguments import real_array
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
+# The luminance of linear sRGB (IEC 61966-2-1, ITU-R BT.709).
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
 
 def unit_directions(value: ArrayLike, name: str) -> Floats:
     """Return ``value`` (..., 3) as float64 unit vectors.

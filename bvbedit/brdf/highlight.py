@@ -4,14 +4,13 @@ import numpy as np
 
 from bvbedit.brdf.base import Brdf
 from bvbedit.brdf.charts import HALF_DIFF
+from bvbedit.brdf.geometry import LUMINANCE
 
 # The highlight is looked at where the difference angle is this, across the plane of incidence, up to a half angle of
 # 60 degrees: far from grazing, where nearly all materials shine.
 THETA_D, FARTHEST, NODES = 20.0, 60.0, 3001
 # Less bright than so many times the rest, it is none.
 FAINT = 2.0
-# The luminance of linear sRGB (ITU-R BT.709).
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
 def highlight_width(brdf: Brdf) -> float:

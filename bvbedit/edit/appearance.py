@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from bvbedit.brdf.charts import HALF_DIFF, grid_points
-from bvbedit.brdf.geometry import Floats
+from bvbedit.brdf.geometry import LUMINANCE, Floats
 from bvbedit.brdf.plausibility import albedo
 from bvbedit.brdf.spline_brdf import SplineBrdf, face_spread, keep_faces
 from bvbedit.brdf.structure import FACE_ROUNDING, with_faces
@@ -24,8 +24,6 @@ Rgb = tuple[float, float, float]
 
 LARGEST_GAIN = 1e6
 PART = "the whole material, what depends on the half angle (highlight) or does not (body)"
-# Luminance of linear sRGB (IEC 61966-2-1).
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 # The least share of a colour's luminance that a channel may have after its hue was turned.
 PUREST = 0.01
 # Elevations over which the energy is averaged, weighted by cosine and solid angle.

@@ -10,7 +10,18 @@ from bvbedit_gui.dialogs import dialogs, start_page
 from bvbedit_gui.preview_view import SCENES
 from bvbedit_gui.side import side
 from bvbedit_gui.style import SCRIPT, STYLE
-from bvbedit_gui.widgets import axis_name, button, marks, number_row, panel, picture, select, toggle, variable
+from bvbedit_gui.widgets import (
+    axis_name,
+    button,
+    marks,
+    number_row,
+    panel,
+    picture,
+    select,
+    toggle,
+    variable,
+    view_buttons,
+)
 
 if TYPE_CHECKING:
     from bvbedit_gui.viewer import Viewer
@@ -112,21 +123,8 @@ def _volume(viewer: "Viewer") -> None:
             ),
             classes="mr-2",
         )
-        for name, face in (
-            ("oblique", "3D"),
-            ("0", "{{ axis_names[0] }}"),
-            ("1", "{{ axis_names[1] }}"),
-            ("2", "{{ axis_names[2] }}"),
-        ):
-            v3.VBtn(
-                face,
-                size="x-small",
-                variant="text",
-                min_width=30,
-                classes="px-1 text-none",
-                **marks(aria_label=f"look from side {name}", data_test=f"look {name}"),
-                click=(view.look_from, f"['{name}']"),
-            )
+        sides = [(str(n), axis_name(n)) for n in range(3)]
+        view_buttons("look", (("oblique", "3D"), *sides), view.look_from)
 
     with panel("volume", "Volume", head):
         view.send = picture("volume", view.area)
@@ -178,16 +176,7 @@ def _lobes(viewer: "Viewer") -> None:
             classes="mr-2",
             disabled=("against === 'nothing'",),
         )
-        for name, face in (("oblique", "3D"), ("side", "side"), ("top", "top")):
-            v3.VBtn(
-                face,
-                size="x-small",
-                variant="text",
-                min_width=30,
-                classes="px-1 text-none",
-                click=(view.look_from, f"['{name}']"),
-                **marks(data_test=f"lobe {name}"),
-            )
+        view_buttons("lobe", (("oblique", "3D"), ("side", "side"), ("top", "top")), view.look_from)
 
     with panel("lobes", "Lobes", head):
         view.send = picture("lobes", view.area)

@@ -16,8 +16,6 @@ from bvbedit.errors import BvbError
 from bvbedit.io import load
 from bvbedit_gui.places import MODELS, Places
 
-UNTITLED = "untitled"
-
 
 @dataclass(frozen=True)
 class Opened:

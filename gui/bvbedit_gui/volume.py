@@ -12,7 +12,7 @@ import numpy as np
 
 from bvbedit.brdf.base import Brdf
 from bvbedit.brdf.charts import Chart, grid_points
-from bvbedit.brdf.geometry import Floats
+from bvbedit.brdf.geometry import LUMINANCE, Floats
 from bvbedit.brdf.spline_brdf import SplineBrdf
 
 if TYPE_CHECKING:
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
 # What of the reflectance is shown: a mean by sight, a channel, or by how much it differs from a reference.
 What = Literal["luminance", "red", "green", "blue", "difference"]
-# The luminance of linear sRGB (ITU-R BT.709).
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 # The name of the point array by which meshes are coloured: levels, see ``Field``.
 LEVEL = "level"
 # Below this (1/sr) reflectance counts as black: a logarithm needs a floor, and no measurement resolves less.

@@ -169,6 +169,20 @@ def number_row(
         )
 
 
+def view_buttons(prefix: str, views: Sequence[tuple[str, str]], look_from: Any) -> None:
+    """Show buttons that look at a scene from its views: their names, and what is written on them."""
+    for name, face in views:
+        v3.VBtn(
+            face,
+            size="x-small",
+            variant="text",
+            min_width=30,
+            classes="px-1 text-none",
+            click=(look_from, f"['{name}']"),
+            **marks(aria_label=f"look from: {name}", data_test=f"{prefix} {name}"),
+        )
+
+
 def _limit(value: float) -> str:
     """Return a limit in words."""
     if abs(value) >= 1e100:
