@@ -52,8 +52,9 @@ def fit(
     the control net and interior knots as stored; or ``tolerance``, of the metric over both of its sample sets. They
     exclude each other. With none of them the net is as large as the knee of the error curve asks for.
 
-    ``metric`` names what is to be small: ``log_cosine_rms``, ``fores`` or ``relative_l1``. ``weights``, a function of
-    chart parameters (n, 3) that returns (n,) >= 0, multiplies the weights that follow from it. ``scene``, as ``render``
+    ``metric`` names what is to be small: ``log_cosine_rms``, ``fores``, ``relative_l1``, or ``e_rms``, the root mean
+    square of the paper's error E; in the paper's chart and encoding its nets are lofted, whatever the knots, as the
+    paper does. ``weights``, a function of chart parameters (n, 3) that returns (n,) >= 0, multiplies the weights that follow from it. ``scene``, as ``render``
     has it, replaces both: what counts is what that scene shows of the material, on an 8-bit screen; ``tolerance`` then
     bounds the root mean square error of its pixels, 0 ... 1 (``picture_rms``). ``precision``: ``quantised``
     (``auto``, but ``float32`` in the paper's configuration; it adds 4 % to the error), ``float16``, ``float32`` or

@@ -104,11 +104,11 @@ def wished(
     if smoothing is not None and not _is_auto(smoothing) and not is_real_within(smoothing, 0.0, 1e15):
         raise BvbError(f"smoothing is {shown(smoothing)}. Give a strength in 0 ... 1e15, or {AUTO!r}.")
     encodings = tuple(encoding_named(name) for name in (ENCODINGS if _is_auto(encoding) else (encoding,)))
+    checked, placement, loss = checked_degrees(degrees), checked_placement(knots), loss_named(metric)
     if precision == AUTO:
         # The paper's nets are floats.
-        published = len(charts) == 1 and is_published(charts[0], encodings[0], checked_placement(knots))
+        published = len(charts) == 1 and is_published(charts[0], encodings[0], placement, loss)
         precision = "float32" if published else "quantised"
-    checked, placement, loss = checked_degrees(degrees), checked_placement(knots), loss_named(metric)
     for name, bound in (("max_bytes", max_bytes), ("max_payload", max_payload)):
         if bound is not None and (not is_whole(bound) or not 1 <= bound <= LARGEST_BUDGET):
             raise BvbError(f"{name} is {shown(bound)}. Give a whole number of bytes from 1 to {LARGEST_BUDGET:,}.")
@@ -150,16 +150,16 @@ def fitted(
     metric = wish.loss
     if interest is not None:
         wish = replace(wish, loss=interest.loss, weights=interest)
-    if wish.weights is not None and is_published(wish.charts[0], wish.encodings[0], wish.knots):
+    if wish.weights is not None and is_published(wish.charts[0], wish.encodings[0], wish.knots, wish.loss):
         raise BvbError(
-            "The paper's configuration weighs all alike. Leave weights and scene out, or choose other knots."
+            "The paper's configuration weighs all alike. Leave weights and scene out, or choose another chart."
         )
     size, max_bytes, max_payload, tolerance = wish.size, wish.max_bytes, wish.max_payload, wish.tolerance
 
     noise = estimate_noise(brdf, metric)
     if size is not None:
         wish = replace(wish, charts=charts_for(brdf, wish.charts, size))
-        if len(wish.charts) == 1 and is_published(wish.charts[0], wish.encodings[0], wish.knots):
+        if len(wish.charts) == 1 and is_published(wish.charts[0], wish.encodings[0], wish.knots, wish.loss):
             model = _published(brdf, wish.charts[0], wish.encodings[0], size, wish)
             stored = storage_named(wish.precision, model.spline.control)
             model = model.stored_as(stored).told(source=wish.source, noise=noise.to_dict())
@@ -236,7 +236,7 @@ def _settled(
 ) -> SplineBrdf:
     """Return the model of this size, stored as it is best."""
     chart, encoding = made.problem.chart, made.problem.encoding
-    if is_published(chart, encoding, wish.knots):
+    if is_published(chart, encoding, wish.knots, wish.loss):
         model = _published(brdf, chart, encoding, size, wish)
     else:
         model = _settled_over(brdf, made, size, wish, progress)
@@ -256,7 +256,7 @@ def _settled(
 
 def _published(brdf: Brdf, chart: Chart, encoding: Encoding, size: Sequence[int], wish: Wish) -> SplineBrdf:
     """Return the model in the paper's configuration, with a report that tells no times: these are the caller's."""
-    model = fit_net(brdf, chart, encoding, size=size, degrees=wish.degrees, knots=wish.knots)
+    model = fit_net(brdf, chart, encoding, size=size, degrees=wish.degrees, knots=wish.knots, metric=wish.loss.name)
     report = {name: value for name, value in model.report.items() if name != "seconds"}
     return SplineBrdf(model.spline, chart, encoding, report, storage=model.storage)
 

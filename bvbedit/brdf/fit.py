@@ -13,8 +13,8 @@ from bvbedit.brdf.charts import IN_OUT, Chart
 from bvbedit.brdf.encodings import Encoding, Linear, check_encoding
 from bvbedit.brdf.geometry import Floats
 from bvbedit.brdf.interest import Interest
-from bvbedit.brdf.losses import loss_named
-from bvbedit.brdf.plan import Plan, checked_degrees, checked_placement, checked_size, plan, try_charts
+from bvbedit.brdf.losses import Distance, Loss, loss_named
+from bvbedit.brdf.plan import Plan, checked_degrees, checked_placement, checked_size, knots_for, plan, try_charts
 from bvbedit.brdf.polish import polish
 from bvbedit.brdf.problem import Problem, Table, Weights, on_any_chart, pose, secants, tabulate
 from bvbedit.brdf.samples import draw_samples, samples_for
@@ -23,7 +23,7 @@ from bvbedit.errors import BvbError
 from bvbedit.spline.adaptive import AxisLines, axis_lines
 from bvbedit.spline.arguments import one_per_axis
 from bvbedit.spline.fitting import FitResult, fit_weighted, loft
-from bvbedit.spline.knots import checked_knots, place_knots
+from bvbedit.spline.knots import checked_knots
 from bvbedit.spline.smoothing import smooth
 from bvbedit.spline.tensor import TensorSpline
 
@@ -58,9 +58,9 @@ def fit_net(
     Directions that are one pair in the chart (its folds) are averaged. What stands in cells without data has no
     influence: there the value held from the nearest cell with data asks for a small weight, so that the model has no
     freedom to run wild. The control points of degenerate faces are kept equal. ``weights`` (n, 3) -> (n,) of chart
-    parameters multiplies the weights that the metric asks for. The published configuration alone (``in-out``,
-    ``linear``, ``piegl-tiller``) is lofted to the filled table with equal weights and free faces (Lee & Park 2008).
-    Raises BvbError where size and degrees do not suit each other or the data.
+    parameters multiplies the weights that the metric asks for. The published configurations alone (``in-out`` and
+    ``linear``, with knots ``piegl-tiller`` or the metric ``e_rms``) are lofted to the filled table with equal weights
+    and free faces (Lee & Park 2008). Raises BvbError where size and degrees do not suit each other or the data.
     """
     check_brdf(brdf, "brdf")
     check_fitting_chart(chart)
@@ -68,8 +68,8 @@ def fit_net(
     size, degrees = checked_size(size), checked_degrees(degrees)
     knots, loss = checked_placement(knots), loss_named(metric)
     start = perf_counter()
-    if is_published(chart, encoding, knots):
-        return _published(brdf, encoding, size, degrees).told(seconds=perf_counter() - start)
+    if is_published(chart, encoding, knots, loss):
+        return _published(brdf, encoding, size, degrees, knots).told(seconds=perf_counter() - start)
     points, wanted = math.prod(size), on_any_chart(weights)
     (trial,) = try_charts(brdf, [chart], [encoding], loss, degrees=degrees, points=points, weights=wanted)
     made = plan(
@@ -88,9 +88,10 @@ def fit_net(
     return settle(brdf, made, size, weights=wanted, progress=progress).told(knots=knots, seconds=perf_counter() - start)
 
 
-def is_published(chart: Chart, encoding: Encoding, knots: str) -> bool:
-    """Return whether this is the configuration of Lee & Park (2008)."""
-    return chart is IN_OUT and isinstance(encoding, Linear) and knots == "piegl-tiller"
+def is_published(chart: Chart, encoding: Encoding, knots: str, loss: Loss) -> bool:
+    """Return whether this is a fit of Lee & Park (2008): over their knots, or over others to their error E."""
+    in_their_terms = chart is IN_OUT and isinstance(encoding, Linear)
+    return in_their_terms and (knots == "piegl-tiller" or isinstance(loss, Distance))
 
 
 def fit_over(
@@ -224,13 +225,15 @@ def _settle_over(
     return _reported(first, spline, problem.table, problem.encoding, "metric").told(metric=problem.loss.name)
 
 
-def _published(brdf: Brdf, encoding: Encoding, size: Sequence[int], degrees: Sequence[int]) -> SplineBrdf:
+def _published(
+    brdf: Brdf, encoding: Encoding, size: Sequence[int], degrees: tuple[int, int, int], placement: str
+) -> SplineBrdf:
     """Return the fit of Lee & Park (2008): the paper's grid, one side, equal weights, free faces."""
     table = tabulate(brdf, IN_OUT, IN_OUT.grid, mirrored=False)
     values = encoding.encode(table.sides[0])
-    vectors = [place_knots("piegl-tiller", u, n, p) for u, n, p in zip(table.axes, size, degrees, strict=True)]
-    result = loft(values, table.axes, vectors, degrees)
-    return _reported(result, result.spline, table, encoding, "lofting").told(knots="piegl-tiller")
+    knots = knots_for(values, table, placement, size, degrees)
+    result = loft(values, table.axes, knots, degrees)
+    return _reported(result, result.spline, table, encoding, "lofting").told(knots=placement)
 
 
 def _reported(result: FitResult, spline: TensorSpline, table: Table, encoding: Encoding, solver: str) -> SplineBrdf:

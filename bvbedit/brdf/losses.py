@@ -103,6 +103,20 @@ class RelativeL1(Loss):
 
 
 @dataclass(frozen=True)
+class Distance(Loss):
+    """T = f, squared: the distances E of Lee & Park (2008), eq. 7, whose highlights count above all else."""
+
+    name: str = "e_rms"
+    power: float = 2.0
+
+    def transform(self, f: Floats, cos_i: Floats, cos_o: Floats) -> Floats:
+        return f
+
+    def slope(self, f: Floats, cos_i: Floats, cos_o: Floats) -> Floats:
+        return np.ones_like(f)
+
+
+@dataclass(frozen=True)
 class PictureError(Loss):
     """T = 2 scale sqrt(f + mean), squared: what a picture is off by, which sums f times light over all directions.
 
@@ -124,7 +138,7 @@ class PictureError(Loss):
         return np.asarray(self.scale / np.sqrt(f + self.mean))
 
 
-LOSSES: dict[str, Loss] = {loss.name: loss for loss in (LogCosine(), Fores(), RelativeL1())}
+LOSSES: dict[str, Loss] = {loss.name: loss for loss in (LogCosine(), Fores(), RelativeL1(), Distance())}
 
 
 def loss_named(name: str) -> Loss:

@@ -29,7 +29,7 @@ from bvbedit.spline.adaptive import (
 from bvbedit.spline.arguments import is_whole, one_per_axis, shown
 from bvbedit.spline.fitting import fit_weighted, loft
 from bvbedit.spline.free_knots import move_knots
-from bvbedit.spline.knots import PLACEMENTS, checked_degree
+from bvbedit.spline.knots import PLACEMENTS, checked_degree, place_knots
 from bvbedit.spline.tensor import TensorSpline
 from bvbedit.threads import side_by_side
 
@@ -79,12 +79,8 @@ class Plan:
 
         Raises BvbError where the data of an axis do not carry so many.
         """
-        for axis, (path, n) in enumerate(zip(self.paths, size, strict=True)):
-            if not path.fewest <= n <= path.most:
-                raise BvbError(
-                    f"{shown(n)} control points along {self.problem.chart.axes[axis]} are not what its data and degree "
-                    f"{path.degree} carry. Choose a whole number in {path.fewest} ... {path.most}."
-                )
+        for axis, path, n in zip(self.problem.chart.axes, self.paths, size, strict=True):
+            _check_carried(path, axis, n)
         return tuple(path.of(int(n)) for path, n in zip(self.paths, size, strict=True))
 
     def walk(self, points: int) -> list[tuple[int, ...]]:
@@ -223,6 +219,25 @@ def plan(
     return Plan(problem, (p0, p1, p2), lines, paths)
 
 
+def knots_for(
+    values: Floats, table: Table, placement: str, size: Sequence[int], degrees: tuple[int, int, int]
+) -> tuple[Floats, ...]:
+    """Return full knot vectors for ``size`` control points, of ``values`` (m_1, m_2, m_3, c) that all count alike.
+
+    Raises BvbError where the data of an axis do not carry so many.
+    """
+    if placement in PLACEMENTS:
+        return tuple(place_knots(placement, u, n, p) for u, n, p in zip(table.axes, size, degrees, strict=True))
+    lines = axis_lines(values, np.ones(values.shape[:-1]), table.axes)
+    vectors = []
+    for axis, of_axis, n, p in zip(table.chart.axes, lines, size, degrees, strict=True):
+        path = dominant_knots(of_axis, p, n)
+        _check_carried(path, axis, n)
+        knots = path.of(n)
+        vectors.append(_rounded(move_knots(of_axis, knots, p).knots if placement == "free" else knots))
+    return tuple(vectors)
+
+
 def checked_size(size: object) -> tuple[int, int, int]:
     """Return ``size``. Raises BvbError where it is no three whole numbers above zero, or more than any net has."""
     numbers = one_per_axis(size, "Size")
@@ -258,6 +273,14 @@ def _path(lines: AxisLines, placement: str, degree: int, points: int) -> KnotPat
         return placed_knots(lines, placement, degree, most)
     path = dominant_knots(lines, degree, most)
     return KnotPath(degree, tuple(_rounded(t) for t in path.knots), path.errors)
+
+
+def _check_carried(path: KnotPath, axis: str, n: int) -> None:
+    if not path.fewest <= n <= path.most:
+        raise BvbError(
+            f"{shown(n)} control points along {axis} are not what its data and degree {path.degree} carry. "
+            f"Choose a whole number in {path.fewest} ... {path.most}."
+        )
 
 
 def _rounded(knots: Floats) -> Floats:

@@ -59,8 +59,9 @@ class FitOptions:
         default=None,
     )
     tolerance: float | None = number(1e-12, 1e12, "largest metric, in place of a size", default=None)
-    metric: Literal["log_cosine_rms", "fores", "relative_l1"] = choice(
-        "what is to be small: log_cosine_rms, fores or relative_l1", default="log_cosine_rms"
+    metric: Literal["log_cosine_rms", "fores", "relative_l1", "e_rms"] = choice(
+        "what is to be small: log_cosine_rms, fores, relative_l1, or e_rms, plain differences as the paper has them",
+        default="log_cosine_rms",
     )
     precision: Literal["auto", "float16", "float32", "float64", "quantised"] = choice(
         "how a file holds control points; auto is quantised, but float32 in the paper's configuration", default="auto"

@@ -177,9 +177,9 @@ def default_plan() -> Plan:
     return Plan(
         series=(
             Series("paper", knots="piegl-tiller", size=n, **paper),
-            Series("paper dominant", knots="dominant", size=n[::2], **paper),
+            Series("paper dominant", knots="dominant", metric="e_rms", size=(*n[:4], n[5], n[7]), **paper),
             Series("half-diff root", chart="half-diff", encoding="root", max_bytes=kib),
-            Series("in-out root", chart="in-out", encoding="root", max_bytes=kib[1:5]),
+            Series("in-out root", chart="in-out", encoding="root", max_bytes=kib[1:5:2]),
             Series("auto", max_bytes=kib[1:5:2]),
             Series(
                 "degree",

@@ -64,11 +64,11 @@ def _error_plot(
     materials = [m for m in table.materials if any(row.material == m for row in every)]
     few = len(materials) <= MOST_COLOURS
     series = list(found)
-    rose = _rises(found, quantities[0])
+    rose = "; ".join(f"{pretty_words(q.label)} in {_rises(found, q)}" for q in quantities)
     said = (
         f"{words}, for nets of n x n x 4n control points; {quoted(series)}. "
         + ("A colour for each material. " if few else "A thin line for each material, the median bold. ")
-        + f"{pretty_words(quantities[0].label)} grows from one n to the next larger one in {rose}. "
+        + f"What grows from one n to the next larger one: {rose}. "
         + agreement(every, table.scenes)
     )
 
