@@ -86,9 +86,13 @@ class VolumeView:
         self.send: Any = lambda: None
         self.field: volume.Field | None = None
         self._unseen = True
+        # The iso-value that the user has chosen, and the one in its place where the field does not span it: while a
+        # blend is dragged there and back, the choice must not be lost.
+        self._chosen = self._instead = float(STARTS["iso"])
         self._kept: tuple[Brdf, Chart, tuple[int, ...], Floats] | None = None
         on = self.state.change
         on("what")(lambda **_: self.refresh())
+        on("iso")(lambda **_: self._choose())
         on("iso", "iso_count", "iso_gap", "opacity")(lambda **_: self.show_surfaces())
         on("show_net", "show_knots", *(f"slice_{n}{s}" for n in range(3) for s in ("", "_on")))(
             lambda **_: self.refresh()
@@ -156,9 +160,16 @@ class VolumeView:
             self._unseen = False
             gap = float(np.log10(values[1] / values[0])) if len(values) > 1 else 0.5
             top = float(np.log10(values[-1])) if values else last
-            state.update({"iso": round(top, 3), "iso_gap": min(round(gap, 2), 2.0), "iso_count": min(len(values), 3)})
-        elif real(state.iso, first, first, last) != state.iso:
-            state.iso = real(state.iso, first, first, last)
+            state.update({"iso_gap": min(round(gap, 2), 2.0), "iso_count": min(len(values), 3)})
+            self._chosen = round(top, 3)
+        else:
+            self._choose()
+        state.iso = self._instead = real(self._chosen, first, first, last)
+
+    def _choose(self) -> None:
+        """Keep the iso-value that the user has chosen."""
+        if self.state.iso != self._instead:
+            self._chosen = self._instead = self.state.iso
 
     def _colours(self, field: volume.Field, low: float, high: float) -> None:
         from matplotlib import colormaps

@@ -121,6 +121,8 @@ def steps(desk: Desk, rows: Table) -> None:
     desk.choose("knob_blend_partner", "blue.bvb")
     desk.slide("knob_blend_t", 0.5)
     desk.wait("edit_pending", "pending => pending")
+    # At an end of the slider a step would change nothing.
+    desk.slide("iso", 0.5)
     for n in range(STEPS):
         for times, slider, panels in (
             (iso, "iso", ["volume"]),

@@ -153,3 +153,22 @@ def test_the_picture_is_another_one_after_each_of_them(folder):
             before = after
 
     with_viewer(folder, use, "gold.bvb")
+
+
+def test_an_iso_value_beyond_the_field_is_taken_up_again_when_the_field_spans_it_again(folder):
+    async def use(viewer):
+        chosen = viewer.state.iso_high - 0.1
+        await let(viewer, iso=chosen, op="gain")
+        for gain in (0.1, 0.01):
+            await let(viewer, knob_gain_factor=gain)
+            assert viewer.state.iso == viewer.state.iso_high < chosen
+        await let(viewer, knob_gain_factor=1.0)
+        assert viewer.state.iso == chosen
+        # What is chosen meanwhile is the choice.
+        await let(viewer, knob_gain_factor=0.5)
+        other = viewer.state.iso_high - 0.1
+        await let(viewer, iso=other)
+        await let(viewer, knob_gain_factor=1.0)
+        assert viewer.state.iso == other
+
+    with_viewer(folder, use, "gold.bvb")
