@@ -53,12 +53,12 @@ def fit(
     exclude each other. With none of them the net is as large as the knee of the error curve asks for.
 
     ``metric`` names what is to be small: ``log_cosine_rms``, ``fores``, ``relative_l1``, or ``e_rms``, the root mean
-    square of the paper's error E; in the paper's chart and encoding its nets are lofted, whatever the knots, as the
-    paper does. ``weights``, a function of chart parameters (n, 3) that returns (n,) >= 0, multiplies the weights that follow from it. ``scene``, as ``render``
-    has it, replaces both: what counts is what that scene shows of the material, on an 8-bit screen; ``tolerance`` then
-    bounds the root mean square error of its pixels, 0 ... 1 (``picture_rms``). ``precision``: ``quantised``
-    (``auto``, but ``float32`` in the paper's configuration; it adds 4 % to the error), ``float16``, ``float32`` or
-    ``float64``.
+    square of the paper's error E: in its chart and encoding alone, and lofted as the paper does, over any knots.
+    ``weights``, a function of chart parameters (n, 3) that returns (n,) >= 0, multiplies the weights that
+    follow from it. ``scene``, as ``render`` has it, replaces both: what counts is what that scene shows of the
+    material, on an 8-bit screen; ``tolerance`` then bounds the root mean square error of its pixels, 0 ... 1
+    (``picture_rms``). ``precision``: ``quantised`` (``auto``, but ``float32`` in the paper's configurations; it adds
+    4 % to the error), ``float16``, ``float32`` or ``float64``.
     ``smoothing`` penalises differences of the net, for noisy data: a strength, or ``auto`` for the one that generalised
     cross-validation finds. ``thorough`` takes more steps on the metric itself and seconds longer. ``source`` names the
     data in the report, whose bytes count too.

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from bvbedit.brdf.base import Brdf, check_brdf
-from bvbedit.brdf.charts import FITTING_CHARTS, Chart, chart_named
+from bvbedit.brdf.charts import FITTING_CHARTS, IN_OUT, Chart, chart_named
 from bvbedit.brdf.encodings import Encoding, encoding_named
 from bvbedit.brdf.fit import AUTO, THOROUGH_ROUNDS, fit_net, is_published, settle
 from bvbedit.brdf.geometry import Floats
 from bvbedit.brdf.interest import Interest
-from bvbedit.brdf.losses import Loss, loss_named
+from bvbedit.brdf.losses import Distance, Loss, loss_named
 from bvbedit.brdf.metrics import estimate
 from bvbedit.brdf.noise import estimate_noise
 from bvbedit.brdf.plan import Plan, checked_degrees, checked_placement, checked_size, plan, try_charts
@@ -96,6 +96,16 @@ def wished(
             raise BvbError(f"{name} is {shown(text)}. Give a text.")
     if not isinstance(thorough, bool | np.bool_):
         raise BvbError(f"thorough is {shown(thorough)}. Give True or False.")
+    loss = loss_named(metric)
+    if isinstance(loss, Distance):
+        # Least squares on samples misses most of what E counts, which stands in a few peaks: lofting does not.
+        chart = IN_OUT.name if _is_auto(chart) else chart
+        encoding = "linear" if _is_auto(encoding) else encoding
+        if (chart, encoding) != (IN_OUT.name, "linear"):
+            raise BvbError(
+                f"{loss.name} is the paper's error, of its chart and encoding. Choose chart {IN_OUT.name} and encoding "
+                "linear, or another metric."
+            )
     charts = [chart_named(name) for name in (FITTING_CHARTS if _is_auto(chart) else (chart,))]
     if charts[0].name not in FITTING_CHARTS:
         raise BvbError(f"Chart {chart!r} is for tables only. Fit in one of {', '.join((AUTO, *FITTING_CHARTS))}.")
@@ -104,7 +114,7 @@ def wished(
     if smoothing is not None and not _is_auto(smoothing) and not is_real_within(smoothing, 0.0, 1e15):
         raise BvbError(f"smoothing is {shown(smoothing)}. Give a strength in 0 ... 1e15, or {AUTO!r}.")
     encodings = tuple(encoding_named(name) for name in (ENCODINGS if _is_auto(encoding) else (encoding,)))
-    checked, placement, loss = checked_degrees(degrees), checked_placement(knots), loss_named(metric)
+    checked, placement = checked_degrees(degrees), checked_placement(knots)
     if precision == AUTO:
         # The paper's nets are floats.
         published = len(charts) == 1 and is_published(charts[0], encodings[0], placement, loss)

@@ -39,6 +39,8 @@ SHARP = {"chart": "half-diff", "encoding": "root"}
         ({"size": (4, 4, 4), "degrees": (3, 3, 4)}, "4 control points along"),
         ({"knots": "random"}, "Unknown knot placement 'random'"),
         ({"metric": "psnr"}, "Unknown metric 'psnr'"),
+        ({"metric": "e_rms", "chart": "half-diff"}, "e_rms is the paper's error, of its chart and encoding"),
+        ({"metric": "e_rms", "encoding": "root"}, "Choose chart in-out and encoding linear, or another metric"),
         ({"size": (4, 4, 4), "tolerance": 0.1}, "exclude each other"),
         ({"max_payload": 10}, "10 bytes hold no net"),
         ({"max_bytes": 900}, "900 bytes hold no net"),

@@ -71,7 +71,7 @@ def fit_net(
     if is_published(chart, encoding, knots, loss):
         return _published(brdf, encoding, size, degrees, knots).told(seconds=perf_counter() - start)
     points, wanted = math.prod(size), on_any_chart(weights)
-    (trial,) = try_charts(brdf, [chart], [encoding], loss, degrees=degrees, points=points, weights=wanted)
+    trial = try_charts(brdf, [chart], [encoding], loss, degrees=degrees, points=points, weights=wanted)[0]
     made = plan(
         tabulate(brdf, chart),
         encoding,
@@ -118,7 +118,7 @@ def fit_over(
         raise BvbError(f"{len(given)} knot vectors given. Give three, one for each axis.")
     vectors = tuple(checked_knots(t, p) for t, p in zip(given, degrees, strict=True))
     points = math.prod(len(t) - p - 1 for t, p in zip(vectors, degrees, strict=True))
-    (trial,) = try_charts(brdf, [chart], [encoding], loss, degrees=degrees, points=points)
+    trial = try_charts(brdf, [chart], [encoding], loss, degrees=degrees, points=points)[0]
     problem = pose(tabulate(brdf, chart), encoding, loss, trial.balance, surrogate=trial.surrogate)
     lines = axis_lines(problem.values, problem.weights, problem.table.axes)
     model = _settle_over(brdf, problem, lines, vectors, degrees, progress=progress)

@@ -307,8 +307,8 @@ def try_charts(
     """Return trials of each chart with each encoding for nets of about so many ``points``, the best one first.
 
     A trial lofts over dominant points on the coarse grid of the chart, judged by samples of the metric itself: what a
-    folded chart cannot represent counts against it. The weights are those of ``SURROGATE``; a metric that is no mean of
-    squares is tried with its own weights too, at the end. An interest has its own.
+    folded chart cannot represent counts against it. The weights are those of ``SURROGATE``; at the end another metric
+    is tried with its own weights too. An interest has its own.
     """
     reflectance = drawn(brdf, TRIAL_SAMPLES, weights=weights)
     usual = loss if isinstance(weights, Interest) else SURROGATE

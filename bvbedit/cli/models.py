@@ -82,7 +82,7 @@ def fit(
         Largest metric, in place of a size: the smallest net that keeps it on both sets of samples. With a scene, the
         largest root mean square error of its pixels, as a share of white.
     metric
-        log_cosine_rms, fores, relative_l1, or e_rms (plain differences, as the paper has them): what is to be small.
+        What is to be small: log_cosine_rms, fores, relative_l1, or e_rms, the paper's error in its chart and encoding.
     scene
         Only what this scene (a name, a .toml or an .exr) shows of the material counts, in place of the metric.
     image_tolerance

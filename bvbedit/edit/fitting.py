@@ -60,7 +60,7 @@ class FitOptions:
     )
     tolerance: float | None = number(1e-12, 1e12, "largest metric, in place of a size", default=None)
     metric: Literal["log_cosine_rms", "fores", "relative_l1", "e_rms"] = choice(
-        "what is to be small: log_cosine_rms, fores, relative_l1, or e_rms, plain differences as the paper has them",
+        "what is to be small: log_cosine_rms, fores, relative_l1, or e_rms (the paper's, in-out and linear)",
         default="log_cosine_rms",
     )
     precision: Literal["auto", "float16", "float32", "float64", "quantised"] = choice(

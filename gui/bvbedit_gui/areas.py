@@ -2,6 +2,10 @@
 
 Each is what trame-rca calls a remote controlled area: it is told its size and what the mouse does, and asked for its
 pixels, first at once and then, when nothing has moved for a moment, once more for a picture to keep.
+
+VTK is used in one thread alone, that of the page's events. It frees objects under a lock of its own, and tells Python
+of it there; another thread that holds the interpreter and makes or frees an object meanwhile waits for that lock, and
+neither ever goes on. What is made in other threads is arrays.
 """
 
 from collections.abc import Callable

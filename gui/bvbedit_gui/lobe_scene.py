@@ -5,12 +5,13 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from bvbedit.brdf.encodings import Encoding
-from bvbedit.brdf.geometry import spherical
+from bvbedit.brdf.geometry import Floats, spherical
 from bvbedit_gui import lobes
 from bvbedit_gui.drawing import Point, add_arrow, add_ground, look, number, write_at
+from bvbedit_gui.lobes import Lobe
 
 if TYPE_CHECKING:
-    from pyvista import Actor, Plotter, PolyData
+    from pyvista import Actor, Plotter
 
 # Lobes are coloured at full brightness: white paint and chrome would vanish on white, so it is night in all themes.
 NIGHT, CHALK, FAINT = "#33373d", "#eceff1", "#767d85"
@@ -54,33 +55,29 @@ class LobeScene:
 
     def show(
         self,
-        mesh: "PolyData",
+        lobe: Lobe,
         scale: Encoding,
         peak: float,
         theta_i: float,
         *,
-        other: "PolyData | None" = None,
+        other: Lobe | None = None,
         beside: Beside = "none",
     ) -> None:
-        """Show a ``lobes.lobe`` with its ground grid and the incident and mirror directions.
+        """Show a lobe with its ground grid and the incident and mirror directions.
 
         ``peak`` (1/sr) is the length drawn as radius 1, so that lobes shown with one peak and one scale can be
         compared; what is longer is cut there. ``theta_i`` in radians. ``other`` is a second lobe, as a wire over the
         first or beside it.
         """
-        drawn = lobes.scaled(mesh, scale, peak)
-        self._model.mapper.dataset = drawn
+        self._model.mapper.dataset = lobes.surface(lobe, scale, peak)
         self._model.visibility = True
         self._other.visibility = other is not None and beside != "none"
         shift = APART if self._other.visibility and beside == "beside" else 0.0
         self._model.position = (-shift / 2, 0.0, 0.0)
         if other is not None and beside != "none":
-            twin = lobes.scaled(other, scale, peak)
-            if beside == "wire":
-                twin = lobes.wire(twin)
-            self._other.mapper.dataset = twin
+            self._other.mapper.dataset = (lobes.wire if beside == "wire" else lobes.surface)(other, scale, peak)
             self._other.position = (shift / 2, 0.0, 0.0)
-        self._ground(scale, peak, drawn, shift)
+        self._ground(scale, peak, lobes.points(lobe, scale, peak), shift)
         self._directions(theta_i, shift)
         width = 1.3 + shift / 2
         if width != self._width:
@@ -97,7 +94,7 @@ class LobeScene:
         """Let the lobes fill the picture, which has another size now."""
         self.look_from(self._view)
 
-    def _ground(self, scale: Encoding, peak: float, mesh: "PolyData", shift: float) -> None:
+    def _ground(self, scale: Encoding, peak: float, vertices: Floats, shift: float) -> None:
         small = round(0.85 * self.text_size)
         marks = lobes.rings(scale, peak)
         middles = (0.0,) if shift == 0 else (-shift / 2, shift / 2)
@@ -105,7 +102,7 @@ class LobeScene:
         for n, (length, radius) in enumerate(marks):
             # Front left: beside the lobe, and the rings are well apart there.
             at = radius * spherical(np.pi / 2, np.radians(-140.0))
-            hidden = lobes.hides(mesh, at, np.subtract(LOBE_EYE, LOBE_FOCUS))
+            hidden = lobes.hides(vertices, at, np.subtract(LOBE_EYE, LOBE_FOCUS))
             place = at - [shift / 2, 0.0, 0.0]
             told = ("", *place) if hidden else (number(length), *place)
             if self._written.get(n) != told:

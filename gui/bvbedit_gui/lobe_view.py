@@ -53,12 +53,12 @@ class LobeView:
             lambda made: self._show(made[0], made[1], theta_i, beside),
         )
 
-    def _show(self, mesh: Any, other: Any, theta_i: float, beside: Any) -> None:
-        peaks = [float(np.max(m.point_data[lobes.LENGTH])) for m in (mesh, other) if m is not None]
+    def _show(self, lobe: lobes.Lobe, other: lobes.Lobe | None, theta_i: float, beside: Beside) -> None:
+        peaks = [one.peak for one in (lobe, other) if one is not None]
         # A black material has no length to scale by.
         peak = max(peaks) or 1.0
-        scale = SCALES.get(one_of(self.state.lobe_scale, SCALES, "auto")) or lobes.fitting_scale(mesh)
-        self.scene.show(mesh, scale, peak, theta_i, other=other, beside=beside)
+        scale = SCALES.get(one_of(self.state.lobe_scale, SCALES, "auto")) or lobes.fitting_scale(lobe)
+        self.scene.show(lobe, scale, peak, theta_i, other=other, beside=beside)
         with self.state:
             told = f"peak {number(peaks[0])}/sr, {WORDS[scale.name]} radius"
             if len(peaks) > 1:
@@ -84,5 +84,5 @@ class LobeView:
 WORDS = {"linear": "linear", "root": "cube-root", "log": "logarithmic"}
 
 
-def _lobe(brdf: Brdf, theta_i: float) -> Any:
+def _lobe(brdf: Brdf, theta_i: float) -> lobes.Lobe:
     return lobes.lobe(brdf, theta_i, lobes.COARSER)

@@ -1,9 +1,11 @@
 """Lobes: f(wi, wo) over all wo at one theta_i, drawn in spherical coordinates (Lee & Park 2008, Fig. 2).
 
 The radius is the length of the colour vector, compressed by a scale; the colour is the colour. Pure functions that
-return PyVista meshes; no window is opened here. Light comes from the -x side: wi = (-sin theta_i, 0, cos theta_i).
+return arrays, and PyVista meshes of them; no window is opened here. Light comes from the -x side:
+wi = (-sin theta_i, 0, cos theta_i).
 """
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -16,9 +18,8 @@ from bvbedit.brdf.geometry import Floats, spherical
 if TYPE_CHECKING:
     from pyvista import PolyData
 
-# The names of the point arrays of a lobe: its colour (sRGB bytes) and the length of the colour vector (1/sr).
+# The name of the point array of a mesh that holds its colour (sRGB bytes).
 COLOUR = "colour"
-LENGTH = "length"
 # Above this ratio of the longest radius to the median a linear lobe is a needle on a dot.
 LINEAR_RANGE = 20.0
 # Half of the great circles leave the mirror direction at equal angles, half reach the horizon in equal steps: seen from
@@ -30,6 +31,30 @@ COARSER = 2
 # more in geometric progression towards the mirror direction, the first at 0.002 to 0.02 degrees. Chrome's lobe is half
 # a degree wide.
 FRACTIONS = np.union1d(np.linspace(0, 1, 121), np.geomspace(1e-4, 0.12, 64))
+
+
+@dataclass(frozen=True)
+class Lobe:
+    """A lobe, uncompressed, on a mesh that is polar about the mirror direction, see ``mirror_mesh``."""
+
+    wo: Floats
+    """(n, 3) unit vectors."""
+    triangles: NDArray[np.int64]
+    """(m, 3), facing outwards."""
+    length: Floats
+    """(n,) of f, in 1/sr."""
+    colour: NDArray[np.uint8]
+    """(n, 3) sRGB bytes, the largest channel at full brightness."""
+
+    @property
+    def peak(self) -> float:
+        """The largest length, in 1/sr."""
+        return float(self.length.max())
+
+    @property
+    def circles(self) -> int:
+        """How many great circles the mesh has: the first triangles are the fan about its vertex 0."""
+        return int((self.triangles[:, 0] == 0).sum())
 
 
 def mirror_mesh(theta_i: float, coarser: int = 1) -> tuple[Floats, NDArray[np.int64]]:
@@ -63,63 +88,47 @@ def mirror_mesh(theta_i: float, coarser: int = 1) -> tuple[Floats, NDArray[np.in
     return directions, np.concatenate([fan, bands.reshape(-1, 3)]).astype(np.int64)
 
 
-def lobe(brdf: Brdf, theta_i: float, coarser: int = 1) -> "PolyData":
-    """Return the lobe of ``brdf`` at ``theta_i`` (radians, below pi/2), uncompressed: radius in 1/sr.
-
-    ``coarser`` as in ``mirror_mesh``.
-
-    Point arrays: ``LENGTH`` (n,) the length of f in 1/sr; ``COLOUR`` (n, 3) sRGB bytes of its colour, the largest
-    channel at full brightness.
-    """
-    import pyvista as pv
-
+def lobe(brdf: Brdf, theta_i: float, coarser: int = 1) -> Lobe:
+    """Return the lobe of ``brdf`` at ``theta_i`` (radians, below pi/2); ``coarser`` as in ``mirror_mesh``."""
     wo, triangles = mirror_mesh(theta_i, coarser)
     f = brdf.evaluate(spherical(theta_i, np.pi), wo)
-    length = np.linalg.norm(f, axis=-1)
-    mesh: pv.PolyData = pv.PolyData.from_regular_faces(wo * length[:, None], cast(Any, triangles))
-    mesh.point_data[LENGTH] = length
-    mesh.point_data[COLOUR] = true_colour(f)
-    mesh.point_data["direction"] = wo
-    return mesh
+    return Lobe(wo, triangles, np.linalg.norm(f, axis=-1), true_colour(f))
 
 
-def scaled(mesh: "PolyData", scale: Encoding, peak: float) -> "PolyData":
-    """Return a ``lobe`` with radius scale(length)/scale(peak), cut where it exceeds ``peak`` (1/sr, positive)."""
-    out = mesh.copy()
-    out.clear_point_data()
-    out.point_data[COLOUR] = mesh.point_data[COLOUR]
-    length = np.minimum(np.asarray(mesh.point_data[LENGTH]), peak)
-    radius = scale.encode(length) / scale.encode(np.array(peak))
-    out.points = np.asarray(mesh.point_data["direction"]) * radius[:, None]
-    smooth: PolyData = out.compute_normals(cell_normals=False, split_vertices=False, consistent_normals=False)
+def points(shown: Lobe, scale: Encoding, peak: float) -> Floats:
+    """Return the vertices (n, 3) of a lobe with radius scale(length)/scale(peak), cut beyond ``peak`` (1/sr)."""
+    radius = scale.encode(np.minimum(shown.length, peak)) / scale.encode(np.array(peak))
+    return np.asarray(shown.wo * radius[:, None])
+
+
+def surface(shown: Lobe, scale: Encoding, peak: float) -> "PolyData":
+    """Return the mesh of a lobe whose vertices are ``points``, coloured, with normals."""
+    import pyvista as pv
+
+    mesh: PolyData = pv.PolyData.from_regular_faces(points(shown, scale, peak), cast(Any, shown.triangles))
+    mesh.point_data[COLOUR] = shown.colour
+    smooth: PolyData = mesh.compute_normals(cell_normals=False, split_vertices=False, consistent_normals=False)
     return smooth
 
 
-def wire(mesh: "PolyData") -> "PolyData":
-    """Return every 16th great circle and ring of a ``lobe``'s mesh as lines, with the colours of its points."""
+def wire(shown: Lobe, scale: Encoding, peak: float) -> "PolyData":
+    """Return every 16th great circle and ring of the mesh of a lobe as lines, coloured; vertices are ``points``."""
     import pyvista as pv
 
-    circles = _circles(mesh)
-    rings = (mesh.n_points - 1) // circles
+    circles = shown.circles
+    rings = (len(shown.wo) - 1) // circles
     index = 1 + np.arange(rings * circles).reshape(rings, circles)
     round_lines = [np.append(ring, ring[0]) for ring in index[7::8]]
     out_lines = [np.append(0, index[:, k]) for k in range(0, circles, max(1, circles // 24))]
     lines = np.concatenate([np.append(len(line), line) for line in (*round_lines, *out_lines)])
-    net = pv.PolyData(mesh.points, lines=lines)
-    net.point_data[COLOUR] = mesh.point_data[COLOUR]
+    net = pv.PolyData(points(shown, scale, peak), lines=lines)
+    net.point_data[COLOUR] = shown.colour
     return net
 
 
-def _circles(mesh: "PolyData") -> int:
-    """Return how many great circles a ``lobe``'s mesh has: the first ones are the fan about its vertex 0."""
-    faces = np.asarray(mesh.regular_faces)
-    return int((faces[:, 0] == 0).sum())
-
-
-def fitting_scale(mesh: "PolyData") -> Encoding:
-    """Return the scale that shows a ``lobe`` whole: linear, or the cube root where the dynamic range is large."""
-    length = np.asarray(mesh.point_data[LENGTH])
-    return Linear() if length.max() <= LINEAR_RANGE * np.median(length) else Root()
+def fitting_scale(shown: Lobe) -> Encoding:
+    """Return the scale that shows a lobe whole: linear, or the cube root where the dynamic range is large."""
+    return Linear() if shown.peak <= LINEAR_RANGE * np.median(shown.length) else Root()
 
 
 def true_colour(f: Floats) -> NDArray[np.uint8]:
@@ -140,12 +149,12 @@ def rings(scale: Encoding, peak: float) -> list[tuple[float, float]]:
     return list(zip(lengths.tolist(), radii.tolist(), strict=True))
 
 
-def hides(mesh: "PolyData", point: Floats, eye: Floats) -> bool:
-    """Return whether ``mesh`` stands between ``point`` (3,) and a viewer far away in the direction ``eye`` (3,).
+def hides(vertices: Floats, point: Floats, eye: Floats) -> bool:
+    """Return whether a mesh stands between ``point`` (3,) and a viewer far away in the direction ``eye`` (3,).
 
-    Judged by the vertices alone, which in a lobe of radius 1 stand closer than the 0.03 that count as a hit.
+    Judged by its ``vertices`` (n, 3) alone, which in a lobe of radius 1 stand closer than the 0.03 that count as a hit.
     """
-    away = np.asarray(mesh.points) - point
+    away = vertices - point
     towards = eye / np.linalg.norm(eye)
     depth = away @ towards
     return bool(((depth > 0) & (np.linalg.norm(away - depth[:, None] * towards, axis=-1) < 0.03)).any())

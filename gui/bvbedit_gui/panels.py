@@ -12,11 +12,12 @@ from bvbedit.brdf.spline_brdf import SplineBrdf
 from bvbedit_gui import volume
 from bvbedit_gui.drawing import font, number, write
 from bvbedit_gui.lobe_scene import CHALK, LIGHT, MIRROR, LobeScene
+from bvbedit_gui.lobes import Lobe
 from bvbedit_gui.themes import LIGHT as BY_DAY
 from bvbedit_gui.volume_scene import VolumeScene
 
 if TYPE_CHECKING:
-    from pyvista import Plotter, PolyData
+    from pyvista import Plotter
 
 # vtkTextProperty: take the font from a file.
 VTK_FONT_FILE = 4
@@ -36,7 +37,7 @@ def show_volume(plotter: "Plotter", model: SplineBrdf, *, text_size: int) -> Non
     first, last = shown.level(np.array([values[0], values[-1]] if values else [low, high]))
     scene.colour_by(first - 0.3, last + 0.3, signed=False)
     scene.show_chart(model.chart)
-    scene.show_surfaces(volume.iso_surfaces(shown, values), opacity=0.5)
+    scene.show_surfaces(volume.iso_surfaces(shown, volume.grid(shown), values), opacity=0.5)
     scene.show_net(volume.net_points(model), shown.level(volume.net_values(model)))
     scene.look_from("oblique")
     marks = {float(shown.level(v)): number(v) for v in values or [high]}
@@ -68,7 +69,7 @@ def _add_bar(plotter: "Plotter", scene: VolumeScene, marks: dict[float, str], te
 
 def show_lobe(
     plotter: "Plotter",
-    mesh: "PolyData",
+    lobe: Lobe,
     scale: Encoding,
     peak: float,
     theta_i: float,
@@ -76,14 +77,14 @@ def show_lobe(
     title: str,
     text_size: int,
 ) -> None:
-    """Show a ``lobes.lobe`` with its ground grid and the incident and mirror directions.
+    """Show a lobe with its ground grid and the incident and mirror directions.
 
     ``peak`` (1/sr) is the length drawn as radius 1, so that lobes shown with one peak and one scale can be compared;
     what is longer is cut there. ``theta_i`` in radians; ``title`` one line or more; ``text_size`` in pixels.
     """
     small = round(0.85 * text_size)
     scene = LobeScene(plotter, text_size)
-    scene.show(mesh, scale, peak, theta_i)
+    scene.show(lobe, scale, peak, theta_i)
     scene.look_from("oblique")
     write(plotter, title, (0.03, 0.96), CHALK, text_size)
     write(plotter, f"{SCALE_WORDS[scale.name]} radius", (0.03, 0.1), CHALK, small)

@@ -92,10 +92,10 @@ def _show_lobes(
     """Show the lobes of model and measurement in the panels of ``row``, on the scale that suits the measurement."""
     theta_i = float(np.radians(drawn))
     brdfs = {"model": model} if measured is None else {"model": model, "measured": measured}
-    meshes = {name: lobes.lobe(brdf, theta_i) for name, brdf in brdfs.items()}
-    peaks = {name: float(np.max(mesh.point_data[lobes.LENGTH])) for name, mesh in meshes.items()}
-    reference = list(meshes)[-1]
-    scale = lobes.fitting_scale(meshes[reference])
+    shown = {name: lobes.lobe(brdf, theta_i) for name, brdf in brdfs.items()}
+    peaks = {name: lobe.peak for name, lobe in shown.items()}
+    reference = list(shown)[-1]
+    scale = lobes.fitting_scale(shown[reference])
     # A black material has no length to scale by.
     peak = min(max(peaks.values()), MOST_OVERSHOOT * peaks[reference] or np.inf) or 1.0
     for column, (name, brdf) in enumerate(brdfs.items(), start=1):
@@ -106,4 +106,4 @@ def _show_lobes(
         if theta_i > brdf.reliable_elevation + 1e-9:
             title += f", unreliable beyond {np.degrees(brdf.reliable_elevation):.3g}°"
         plotter.subplot(row, column)
-        panels.show_lobe(plotter, meshes[name], scale, peak, theta_i, title=title, text_size=text_size)
+        panels.show_lobe(plotter, shown[name], scale, peak, theta_i, title=title, text_size=text_size)

@@ -78,15 +78,9 @@ class Field:
         return np.asarray(np.log10(np.maximum(value, FLOOR)))
 
     @cached_property
-    def grid(self) -> "ImageData":
-        """The levels on the box's regular grid, as VTK has it."""
-        import pyvista as pv
-
-        shape = self.values.shape
-        out = pv.ImageData(dimensions=shape, spacing=[1 / (m - 1) for m in shape])
-        # VTK's first axis runs fastest.
-        out.point_data[LEVEL] = self.level(self.values).ravel(order="F")
-        return out
+    def levels(self) -> Floats:
+        """The levels of all values, the first axis running fastest, as VTK has it."""
+        return self.level(self.values).ravel(order="F")
 
     @cached_property
     def ends(self) -> tuple[float, float]:
@@ -136,11 +130,21 @@ def iso_values(low: float, high: float) -> list[float]:
     return [float(v) for v in np.geomspace(low, high, 6)[1:-1]]
 
 
-def iso_surfaces(shown: Field, values: list[float]) -> "PolyData":
+def grid(shown: Field) -> "ImageData":
+    """Return the box's regular grid, carrying the levels of a field."""
+    import pyvista as pv
+
+    shape = shown.values.shape
+    out = pv.ImageData(dimensions=shape, spacing=[1 / (m - 1) for m in shape])
+    out.point_data[LEVEL] = shown.levels
+    return out
+
+
+def iso_surfaces(shown: Field, over: "ImageData", values: list[float]) -> "PolyData":
     """Return the surfaces on which the field has the given ``values`` (1/sr), carrying their levels, with normals.
 
-    Of a difference, those on which it has plus or minus a value. Empty where no value is met. Between nodes the level
-    is taken to be linear.
+    ``over`` is its ``grid``. Of a difference, those on which it has plus or minus a value. Empty where no value is met.
+    Between nodes the level is taken to be linear.
     """
     import pyvista as pv
 
@@ -149,16 +153,22 @@ def iso_surfaces(shown: Field, values: list[float]) -> "PolyData":
         levels += [-level for level in levels]
     if not levels:
         return pv.PolyData()
-    surfaces: pv.PolyData = shown.grid.contour(levels, scalars=LEVEL, method="flying_edges", compute_normals=True)
+    surfaces: pv.PolyData = over.contour(levels, scalars=LEVEL, method="flying_edges", compute_normals=True)
     return surfaces
 
 
-def slice_mesh(
-    brdf: Brdf, chart: Chart, axis: int, at: float, what: What = "luminance", reference: Brdf | None = None
-) -> "StructuredGrid":
-    """Return the plane where the parameter ``axis`` is ``at``, carrying levels."""
-    import pyvista as pv
+@dataclass(frozen=True)
+class Slice:
+    """A plane across one axis of the box: its nodes along the three axes, and what is shown there."""
 
+    axes: tuple[Floats, Floats, Floats]
+    field: Field
+
+
+def slice_at(
+    brdf: Brdf, chart: Chart, axis: int, at: float, what: What = "luminance", reference: Brdf | None = None
+) -> Slice:
+    """Return the plane where the parameter ``axis`` is ``at``."""
     line = np.linspace(0, 1, SLICE_NODES)
     across = np.array([at])
     axes = (across if axis == 0 else line, across if axis == 1 else line, across if axis == 2 else line)
@@ -166,10 +176,15 @@ def slice_mesh(
     if what == "difference":
         assert reference is not None
         rgb = rgb - sampled(reference, chart, axes)
-    x, y, z = np.meshgrid(*axes, indexing="ij")
-    mesh = pv.StructuredGrid(x, y, z)
-    shown = Field(scalar(rgb, what), signed=what == "difference")
-    mesh.point_data[LEVEL] = shown.level(shown.values).ravel(order="F")
+    return Slice(axes, Field(scalar(rgb, what), signed=what == "difference"))
+
+
+def slice_mesh(plane: Slice) -> "StructuredGrid":
+    """Return a slice as a mesh that carries levels."""
+    import pyvista as pv
+
+    mesh = pv.StructuredGrid(*np.meshgrid(*plane.axes, indexing="ij"))
+    mesh.point_data[LEVEL] = plane.field.levels
     return mesh
 
 

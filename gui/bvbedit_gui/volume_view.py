@@ -18,7 +18,7 @@ from bvbedit_gui.themes import COLOUR_MAP, Theme
 from bvbedit_gui.volume_scene import DIFFERENCE_MAP, VIEWS, VolumeScene
 
 if TYPE_CHECKING:
-    from pyvista import PolyData, StructuredGrid
+    from pyvista import ImageData
 
     from bvbedit_gui.viewer import Viewer
 
@@ -59,13 +59,13 @@ TITLES: dict[volume.What, str] = {
 
 @dataclass(frozen=True)
 class _Drawn:
-    """What a thread has made for the scene."""
+    """What a thread has made for the scene: arrays, no meshes, see ``areas``."""
 
     chart: Chart
     field: volume.Field
     net: tuple[Floats, Floats] | None
-    knots: "list[PolyData] | None"
-    slices: "list[StructuredGrid | None]"
+    knots_of: SplineBrdf | None
+    slices: list[volume.Slice | None]
 
 
 class VolumeView:
@@ -85,6 +85,7 @@ class VolumeView:
         # The page's view, once there is a page: asked to send a picture.
         self.send: Any = lambda: None
         self.field: volume.Field | None = None
+        self.grid: ImageData | None = None
         self._unseen = True
         # The iso-value that the user has chosen, and the one in its place where the field does not span it: while a
         # blend is dragged there and back, the choice must not be lost.
@@ -135,16 +136,17 @@ class VolumeView:
         return self._kept[3]
 
     def _show(self, drawn: _Drawn) -> None:
-        self.field = drawn.field
+        self.field, self.grid = drawn.field, volume.grid(drawn.field)
         low, high = drawn.field.ends
         with self.state:
             self._bounds(low, high)
             self._colours(drawn.field, low, high)
             self.scene.show_chart(drawn.chart)
             self.scene.show_net(*(drawn.net or (None,)))
-            self.scene.show_knots(drawn.knots)
-            for axis, mesh in enumerate(drawn.slices):
-                self.scene.show_slice(axis, mesh)
+            knots_of = drawn.knots_of
+            self.scene.show_knots(None if knots_of is None else [volume.knot_planes(knots_of, n) for n in range(3)])
+            for axis, plane in enumerate(drawn.slices):
+                self.scene.show_slice(axis, None if plane is None else volume.slice_mesh(plane))
             self._viewer.picking.show_region()
             self.show_surfaces()
 
@@ -206,13 +208,13 @@ class VolumeView:
 
     def show_surfaces(self) -> None:
         """Show the surfaces of the values that are asked for."""
-        if self.field is None:
+        if self.field is None or self.grid is None:
             return
         self._viewer.preview.hold()
         values = self.iso_values
         self.state.iso_text = ", ".join(number(v) for v in values)
         opacity = real(self.state.opacity, 0.5, 0.02, 1.0)
-        self.scene.show_surfaces(volume.iso_surfaces(self.field, values), opacity)
+        self.scene.show_surfaces(volume.iso_surfaces(self.field, self.grid, values), opacity)
         self.draw()
 
     def look_from(self, view: str) -> None:
@@ -252,15 +254,15 @@ def _draw(
 ) -> _Drawn:
     field = volume.field(shown, chart, what, other, sample)
     # Here, in a thread, and not when the page waits for surfaces.
-    _ = field.ends, field.grid
-    net, knots = None, None
+    _ = field.ends, field.levels
+    net, knots_of = None, None
     if isinstance(shown, SplineBrdf):
         if with_net:
             plain = volume.Field(field.values)
             net = volume.net_points(shown), plain.level(volume.net_values(shown, what))
         if with_knots:
-            knots = [volume.knot_planes(shown, axis) for axis in range(3)]
+            knots_of = shown
     planes = [
-        None if at is None else volume.slice_mesh(shown, chart, axis, at, what, other) for axis, at in enumerate(slices)
+        None if at is None else volume.slice_at(shown, chart, axis, at, what, other) for axis, at in enumerate(slices)
     ]
-    return _Drawn(chart, field, net, knots, planes)
+    return _Drawn(chart, field, net, knots_of, planes)

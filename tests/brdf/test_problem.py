@@ -1,6 +1,8 @@
 """What a fit comes near to: looked up at the right pairs, weighed as the metric weighs, its noise told by its sides."""
 
 import functools
+import gc
+import weakref
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from bvbedit.brdf.analytic import Lambert
 from bvbedit.brdf.base import Brdf
 from bvbedit.brdf.charts import HALF_DIFF, IN_OUT, RUSINKIEWICZ, RUSINKIEWICZ_360, Chart, grid_points
 from bvbedit.brdf.encodings import Linear, Log, Root
+from bvbedit.brdf.fit import fit_net
 from bvbedit.brdf.geometry import elevation
 from bvbedit.brdf.losses import LOSSES, SMALLEST_SHARE
 from bvbedit.brdf.measured import MeasuredBrdf
@@ -149,11 +152,53 @@ def test_layers_may_be_looked_up_in_any_number_at_once(chart, monkeypatch):
     tables = []
     for rows in (1, 300, 5000, 1 << 20):
         monkeypatch.setattr(threads, "ROWS", rows)
-        tables.append(tabulate(Blind(), chart, SMALL))
+        tables.append(tabulate(Blind(), chart, SMALL))  # a new one each time, whose tables are not kept
     for other in tables[1:]:
         for name in ("sides", "trusted", "cosines"):
             for a, b in zip(getattr(tables[0], name), getattr(other, name), strict=True):
                 np.testing.assert_array_equal(a, b)
+
+
+def test_tables_are_kept_of_the_last_material_alone_and_while_it_lives():
+    looked_up = []
+
+    class Counted(Lambert):
+        def _evaluate(self, wi, wo):
+            looked_up.append(len(wi))
+            return super()._evaluate(wi, wo)
+
+    def tabulated(brdf, **options):
+        before = len(looked_up)
+        return tabulate(brdf, IN_OUT, SMALL, **options), len(looked_up) > before
+
+    one, other = Counted((0.1, 0.2, 0.3)), Counted((0.4, 0.5, 0.6))
+    first, new = tabulated(one)
+    assert new
+    assert tabulated(one) == (first, False)
+    # Another grid, chart or number of sides is another table.
+    for again in (tabulate(one, IN_OUT), tabulate(one, HALF_DIFF, SMALL), tabulate(one, IN_OUT, SMALL, mirrored=False)):
+        assert again is not first
+    assert tabulated(one) == (first, False)
+    assert tabulated(other)[1]
+    assert tabulated(one)[1]
+    # What stands at the same place in memory afterwards is another material.
+    kept = weakref.ref(tabulated(one)[0])
+    del first, one
+    gc.collect()
+    assert kept() is None
+    assert tabulated(Counted((0.1, 0.2, 0.3)))[1]
+
+
+def test_fits_leave_a_table_as_it_is():
+    brdf = Glossy()
+    table = tabulate(brdf, HALF_DIFF)
+    arrays = (*table.sides, *table.trusted, table.densities, table.shares, *table.cosines)
+    before = [a.copy() for a in arrays]
+    fit_net(brdf, HALF_DIFF, Root(), size=(8, 6, 5))
+    fit_net(brdf, HALF_DIFF, Log(), size=(8, 6, 5), knots="free", metric="fores")
+    assert tabulate(brdf, HALF_DIFF) is table
+    for a, b in zip(arrays, before, strict=True):
+        np.testing.assert_array_equal(a, b)
 
 
 @each_chart

@@ -28,42 +28,42 @@ def test_the_mesh_covers_the_hemisphere_once(theta_i):
 @pytest.mark.parametrize("theta_i", ANGLES)
 def test_the_radius_is_the_length_of_the_colour_vector(theta_i):
     brdf = GGX(0.3, Schlick((0.9, 0.6, 0.3)))
-    mesh = lobes.lobe(brdf, theta_i)
-    points = np.asarray(mesh.points, dtype=float)
+    lobe = lobes.lobe(brdf, theta_i)
+    points = np.asarray(lobes.surface(lobe, Linear(), lobe.peak).points, dtype=float) * lobe.peak
     radius = np.linalg.norm(points, axis=1)
     some = radius > 1e-3
     wo = points[some] / radius[some][:, None]
     wo[:, 2] = np.maximum(wo[:, 2], 0)
-    f = brdf.evaluate(spherical(theta_i, np.pi), np.asarray(mesh.point_data["direction"])[some])
+    f = brdf.evaluate(spherical(theta_i, np.pi), lobe.wo[some])
     np.testing.assert_allclose(radius[some], np.linalg.norm(f, axis=1), rtol=1e-5)
-    np.testing.assert_allclose(wo, np.asarray(mesh.point_data["direction"])[some], atol=1e-5)
+    np.testing.assert_allclose(wo, lobe.wo[some], atol=1e-5)
 
 
 @pytest.mark.parametrize("theta_i", ANGLES[:-1])
 def test_a_sharp_lobe_points_to_the_mirror_direction(theta_i):
-    mesh = lobes.lobe(GGX(0.02, Schlick((0.9, 0.9, 0.9))), theta_i)
-    brightest = np.asarray(mesh.point_data["direction"])[np.argmax(mesh.point_data[lobes.LENGTH])]
+    lobe = lobes.lobe(GGX(0.02, Schlick((0.9, 0.9, 0.9))), theta_i)
+    brightest = lobe.wo[np.argmax(lobe.length)]
     assert np.degrees(np.arccos(np.clip(brightest @ spherical(theta_i, 0.0), -1, 1))) < 2.0
 
 
 def test_a_lambert_lobe_is_a_hemisphere_of_its_colour():
-    mesh = lobes.lobe(Lambert((0.8, 0.4, 0.0)), 0.5)
+    lobe = lobes.lobe(Lambert((0.8, 0.4, 0.0)), 0.5)
     length = np.linalg.norm([0.8, 0.4, 0.0]) / np.pi
-    np.testing.assert_allclose(mesh.point_data[lobes.LENGTH], length, rtol=1e-12)
+    np.testing.assert_allclose(lobe.length, length, rtol=1e-12)
     # 0.5 in linear light is 188 of 255 by the sRGB curve (IEC 61966-2-1).
-    assert (np.asarray(mesh.point_data[lobes.COLOUR]) == [255, 188, 0]).all()
+    assert (lobe.colour == [255, 188, 0]).all()
     assert (lobes.true_colour(np.zeros((2, 3))) == 0).all()
 
 
 def test_scales_keep_the_peak_at_one_and_cut_what_exceeds_it():
-    mesh = lobes.lobe(GGX(0.2, Schlick((0.9, 0.9, 0.9))), 0.5)
-    peak = float(np.max(mesh.point_data[lobes.LENGTH]))
+    lobe = lobes.lobe(GGX(0.2, Schlick((0.9, 0.9, 0.9))), 0.5)
+    peak = lobe.peak
     for scale in (Linear(), Root()):
-        radius = np.linalg.norm(lobes.scaled(mesh, scale, peak).points, axis=1)
+        radius = np.linalg.norm(lobes.surface(lobe, scale, peak).points, axis=1)
         assert radius.max() == pytest.approx(1, rel=1e-6)
-        expected = scale.encode(np.asarray(mesh.point_data[lobes.LENGTH]) / peak)
+        expected = scale.encode(lobe.length / peak)
         np.testing.assert_allclose(radius, expected, atol=1e-6)
-        assert np.linalg.norm(lobes.scaled(mesh, scale, peak / 2).points, axis=1).max() == pytest.approx(1, rel=1e-6)
+        assert np.linalg.norm(lobes.surface(lobe, scale, peak / 2).points, axis=1).max() == pytest.approx(1, rel=1e-6)
     assert isinstance(lobes.fitting_scale(lobes.lobe(GGX(0.05, Schlick((0.9, 0.9, 0.9))), 0.5)), Root)
     assert isinstance(lobes.fitting_scale(lobes.lobe(Lambert((0.5, 0.5, 0.5)), 0.1)), Linear)
 

@@ -24,13 +24,13 @@ def test_surfaces_lie_where_the_model_has_their_value():
     model = ramp()
     shown = volume.field(model, model.chart)
     for value in (0.1, 1.0, 10.0):
-        surface = volume.iso_surfaces(shown, [value])
+        surface = volume.iso_surfaces(shown, volume.grid(shown), [value])
         assert surface.n_points > 100
         u = np.asarray(surface.points)[:, 0]
         expected = np.log1p(value / 1e-3) / np.log1p(100 / 1e-3)
         np.testing.assert_allclose(u, expected, atol=2e-4)
         np.testing.assert_allclose(surface.point_data[volume.LEVEL], np.log10(value), atol=1e-6)
-    assert volume.iso_surfaces(shown, []).n_points == 0
+    assert volume.iso_surfaces(shown, volume.grid(shown), []).n_points == 0
 
 
 def test_the_field_has_what_is_shown_of_the_model():
@@ -57,7 +57,7 @@ def test_a_difference_has_a_sign_and_surfaces_of_both():
     model, flat = ramp(), Lambert((0.5, 0.5, 0.5))
     shown = volume.field(model, model.chart, "difference", flat)
     assert shown.signed
-    surface = volume.iso_surfaces(shown, [0.1])
+    surface = volume.iso_surfaces(shown, volume.grid(shown), [0.1])
     u = np.asarray(surface.points)[:, 0]
     levels = np.asarray(surface.point_data[volume.LEVEL])
     for sign in (-1, 1):
@@ -70,7 +70,7 @@ def test_a_difference_has_a_sign_and_surfaces_of_both():
 def test_slices_and_knot_planes_lie_where_they_should():
     model = ramp()
     for axis in range(3):
-        mesh = volume.slice_mesh(model, model.chart, axis, 0.25)
+        mesh = volume.slice_mesh(volume.slice_at(model, model.chart, axis, 0.25))
         points = np.asarray(mesh.points)
         np.testing.assert_allclose(points[:, axis], 0.25)
         rgb = model.encoding.decode(model.spline.evaluate(np.clip(points, 0, 1)))
