@@ -8,7 +8,7 @@ from trame.widgets import html
 from trame.widgets import vuetify3 as v3
 
 from bvbedit_gui.saving import PRECISIONS
-from bvbedit_gui.widgets import COMPACT, marks, message, select
+from bvbedit_gui.widgets import COMPACT, ENTER, marks, message, select
 
 if TYPE_CHECKING:
     from bvbedit_gui.viewer import Viewer
@@ -55,16 +55,23 @@ def _dialog(name: str, title: str, width: int = 520) -> Iterator[None]:
 
 def dialogs(viewer: "Viewer") -> None:
     """Build all dialogs."""
-    with _dialog("open", "Open"), v3.VCardText(classes="scroll", style="max-height: 65vh"):
-        _choices(viewer)
-        message("open")
+    with _dialog("open", "Open", 640):
+        # Above what is scrolled: it is to be seen wherever that was clicked.
+        with html.Div(classes="px-4"):
+            message("open")
+        with v3.VCardText(classes="scroll", style="max-height: 65vh"):
+            _choices(viewer)
+        with v3.VCardActions():
+            v3.VSpacer()
+            v3.VBtn("Cancel", click="dialog = ''")
     with _dialog("save", "Save or export"):
         with v3.VCardText(classes="pt-3"):
             v3.VTextField(
                 label=("'file, in ' + folder",),
                 v_model=("save_name",),
                 update_modelValue="save_name = $event; save_confirm = ''",
-                keydown_enter=(viewer.saving.save_as, "[]"),
+                keydown_enter=(viewer.started(viewer.saving.save_as), "[]"),
+                **ENTER,
                 autofocus=True,
                 **marks(data_test="save name"),
                 classes="mb-3",
@@ -96,7 +103,7 @@ def dialogs(viewer: "Viewer") -> None:
                     "Replace",
                     size="small",
                     classes="ml-2",
-                    click=(viewer.saving.save_as, "[]", "{ over: true }"),
+                    click=(viewer.started(viewer.saving.save_as), "[]", "{ over: true }"),
                     **marks(data_test="replace"),
                 )
         with v3.VCardActions():
@@ -107,7 +114,7 @@ def dialogs(viewer: "Viewer") -> None:
                 color="primary",
                 variant="flat",
                 loading=("saving",),
-                click=(viewer.saving.save_as, "[]"),
+                click=(viewer.started(viewer.saving.save_as), "[]"),
                 **marks(data_test="save now"),
             )
     with _dialog("recipe", "Recipe", 680):
@@ -124,10 +131,7 @@ def dialogs(viewer: "Viewer") -> None:
                 "Copy",
                 color="primary",
                 variant="flat",
-                click="navigator.clipboard ? navigator.clipboard.writeText(recipe).then(() => { toast = 'Copied' }, "
-                "() => { toast = 'The browser does not let pages copy: select the text' }) "
-                ": (toast = 'The browser does not let pages copy: select the text')",
-                **marks(data_test="copy"),
+                **marks(data_test="copy", data_copies="recipe"),
             )
     with _dialog("close", "Close without saving?", 420):
         with v3.VCardText():
@@ -143,7 +147,11 @@ def dialogs(viewer: "Viewer") -> None:
                 **marks(data_test="discard"),
             )
             v3.VBtn(
-                "Save", color="primary", variant="flat", click=viewer.saving.save, **marks(data_test="save and close")
+                "Save",
+                color="primary",
+                variant="flat",
+                click=viewer.started(viewer.saving.save),
+                **marks(data_test="save and close"),
             )
     with _dialog("help", "Help", 640):
         with v3.VCardText(classes="scroll", style="max-height: 70vh"):
@@ -180,7 +188,7 @@ def _choices(viewer: "Viewer") -> None:
                 "Recover",
                 size="x-small",
                 color="primary",
-                click=(viewer.opening.recover, "[name]"),
+                click=(viewer.started(viewer.opening.recover), "[name]"),
                 **marks(data_test="recover"),
             )
             v3.VBtn("Discard", size="x-small", variant="text", click=(viewer.opening.discard_kept, "[name]"))
@@ -199,7 +207,7 @@ def _choices(viewer: "Viewer") -> None:
             variant="tonal",
             classes="text-none ma-1",
             loading=("opening === name",),
-            click=(viewer.opening.open_file, "[name]"),
+            click=(viewer.started(viewer.opening.open_file), "[name]"),
             **marks(data_test="file"),
         )
     html.H3("Samples", classes="text-subtitle-2 mt-3")

@@ -11,6 +11,7 @@ from bvbedit.edit.operations import OPERATIONS
 from bvbedit.edit.structural import InsertKnots
 from bvbedit.errors import BvbError
 from bvbedit_gui import places as files
+from bvbedit_gui import volume
 from bvbedit_gui.given import one_of
 from bvbedit_gui.knobs import edit_from, knobs_of, region_starts, starts
 from bvbedit_gui.latest import Latest
@@ -121,6 +122,10 @@ class Editing:
 
     async def apply(self) -> None:
         """Do the edit in the panel: it becomes part of the history."""
+        async with self._stepping:
+            await self._apply()
+
+    async def _apply(self) -> None:
         with self._viewer.telling("edit"):
             document, edit = self._viewer.session.document, self._edit()
             if self.op in NEUTRAL and not self._is_touched():
@@ -168,9 +173,11 @@ class Editing:
 
     async def insert_knot(self, axis: int, at: float) -> None:
         """Insert a knot where an axis of the volume was clicked."""
-        with self.state, self._viewer.telling("edit"):
-            await self.do(self._viewer.session.document, InsertKnots(axis=axis, at=round(at, 4)))
-            self.state.toast = f"A knot at {at:.4f} of {self.state.axis_names[axis]}"
+        with self.state:
+            async with self._stepping:
+                with self._viewer.telling("edit"):
+                    await self.do(self._viewer.session.document, InsertKnots(axis=axis, at=round(at, 4)))
+                    self.state.toast = f"A knot at {volume.place_on(self._viewer.chart, axis, at)}"
 
     async def undo(self) -> None:
         """Take the last edit back; an edit that is being tried is taken back first."""

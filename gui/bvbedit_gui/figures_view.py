@@ -84,6 +84,7 @@ class FiguresView:
     def _show(self, name: str, value: Any) -> None:
         with self.state:
             self.state.error_figures = ""
+            self._viewer.fresh("figures")
             self.state[name] = value
 
 

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from bvbedit.brdf.spline_brdf import SplineBrdf
 from bvbedit.edit.document import Document
 from bvbedit.edit.fitting import Fit, FitOptions
 from bvbedit.errors import BvbError
@@ -78,19 +79,19 @@ class FitView:
             state.update({"fitting": True, "fit_share": 0.0, "fit_result": ""})
             state.flush()
             if state.fit_of == "source":
-                await self._fit_measurement(here, key, FitOptions(**options))
+                model = await self._fit_measurement(here, key, FitOptions(**options))
             else:
                 document = here.known_document
                 edit = Fit(**options)
                 model = await self.worker.run(tasks.refitted, document.model, edit, progress=self._progress)
                 await self._viewer.editing.do(document, edit, model)
-            state.fit_result = of_fit(self._viewer.session.here.model)
+            state.fit_result = of_fit(model)
         state.fitting = False
 
-    async def _fit_measurement(self, here: Opened, key: int | None, options: FitOptions) -> None:
+    async def _fit_measurement(self, here: Opened, key: int | None, options: FitOptions) -> SplineBrdf:
         if here.measurement is None:
             raise BvbError("There is no measurement to fit. Open one, or fit the present model.")
-        model = await self.worker.run(tasks.fitted, here.measurement, options, progress=self._progress)
+        model: SplineBrdf = await self.worker.run(tasks.fitted, here.measurement, options, progress=self._progress)
         document = Document.of_fit(model, options, **here.measurement.told())
         fitted = Opened(
             f"{Path(here.name).stem}.bvb",
@@ -109,10 +110,15 @@ class FitView:
             self._viewer.session.add(fitted)
         self._viewer.arrived()
         self.state.tab = "fit"
+        return model
 
     def _progress(self, share: float) -> None:
         with self.state:
             self.state.fit_share = round(100 * share)
+
+    def forget(self) -> None:
+        """Tell no more of a fit: another material is worked on."""
+        self.state.fit_result = self.state.error_fit = ""
 
     def stop(self) -> None:
         """Stop the fit."""

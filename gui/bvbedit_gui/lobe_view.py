@@ -64,6 +64,7 @@ class LobeView:
             if len(peaks) > 1:
                 told += f"; compared: peak {number(peaks[1])}/sr"
             self.state.lobe_note = told
+            self._viewer.fresh("lobes")
         self.draw()
 
     def look_from(self, view: str) -> None:

@@ -1,6 +1,7 @@
 """Opening and closing materials: files of the folder, samples, what was kept when the viewer ended."""
 
 import asyncio
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from bvbedit.edit.autosave import autosave_path, discard_autosave
@@ -54,6 +55,8 @@ class Opening:
             if known is not None:
                 self.go_to(known)
                 return
+            if self.state.opening:
+                raise BvbError(f"{self.state.opening} is being opened. Wait a moment.")
             self.state.opening = name
             self.state.flush()
             loop = asyncio.get_running_loop()
@@ -79,15 +82,18 @@ class Opening:
             if not self._viewer.session.places.allowed(autosave_path(path)):
                 raise BvbError(f"What was kept of {name} is a link to elsewhere. Remove it.")
             known = self._viewer.session.find(path)
+            compared: dict[str, Any] = {}
             if known is not None:
-                if self._viewer.session[known].unsaved:
+                here = self._viewer.session[known]
+                if here.unsaved:
                     raise BvbError(f"{name} is open, and has changes. Save it under another name, or close it.")
+                compared = {n: getattr(here, n) for n in ("reference", "reference_name", "measurement")}
                 self._viewer.session.close(known)
             loop = asyncio.get_running_loop()
             opened = await loop.run_in_executor(self._viewer.pool, opened_recovered, path, path.name)
             if opened is None:
                 raise BvbError(f"Nothing was kept of {name}.")
-            self._opened(opened)
+            self._opened(replace(opened, **compared))
 
     def discard_kept(self, name: str) -> None:
         """Remove what was kept of a file."""
@@ -126,7 +132,9 @@ class Opening:
             at = self._viewer.session.current if key is None else self._known(key)
             if at is None:
                 return
-            if self._viewer.session[at].unsaved and self._viewer.session[at].document is not None and not discard:
+            here = self._viewer.session[at]
+            tried = self._viewer.editing.pending is not None and at == self._viewer.session.current
+            if here.document is not None and (here.unsaved or tried) and not discard:
                 self._viewer.session.current = at
                 self.state.closing = at
                 self.state.dialog = "close"
@@ -134,4 +142,5 @@ class Opening:
                 return
             self._viewer.session.close(at)
             self.state.closing = None
+            self.list_files()
             self._viewer.arrived()

@@ -18,6 +18,7 @@ from bvbedit_gui.widgets import (
     panel,
     picture,
     select,
+    stale,
     toggle,
     variable,
     view_buttons,
@@ -32,10 +33,12 @@ def build(viewer: "Viewer") -> None:
     server = viewer.server
     server.state.trame__title = "bvbedit"
     server.state.trame__template_error_reconnect = (
-        '<trame-reconnect :max-retry="100000" :delay="1000" message="The connection is lost; trying again ..."/>'
+        '<trame-reconnect :max-retry="100000" :delay="1000" message="The connection is lost; trying again ... '
+        "What is unsaved was kept: if bvbedit view has ended, start it anew where it was started, and open the address "
+        'that it tells."/>'
     )
     for name, method in (("undo", viewer.editing.undo), ("redo", viewer.editing.redo), ("save", viewer.saving.save)):
-        server.trigger(name)(method)
+        server.trigger(name)(viewer.started(method))
     with DivLayout(server):
         client.Style(STYLE)
         client.Script(SCRIPT)
@@ -72,7 +75,13 @@ def _bar(viewer: "Viewer") -> None:
                 help="The material that is worked on; a dot says that it is not saved.",
             )
         button("mdi-folder-open-outline", "Open ...", (viewer.show_dialog, "['open']"), test="open")
-        button("mdi-content-save-outline", "Save (Ctrl+S)", viewer.saving.save, disabled="!is_model", test="save")
+        button(
+            "mdi-content-save-outline",
+            "Save (Ctrl+S)",
+            "trigger('save')",
+            disabled="!is_model",
+            test="save",
+        )
         button(
             "mdi-content-save-edit-outline",
             "Save as ...",
@@ -91,8 +100,14 @@ def _bar(viewer: "Viewer") -> None:
             "mdi-close", "Close this material", (viewer.opening.close, "[]"), disabled="!documents.length", test="close"
         )
         v3.VDivider(vertical=True, classes="mx-1")
-        button("mdi-undo", "Undo (Ctrl+Z)", viewer.editing.undo, disabled="!can_undo && !edit_pending", test="undo")
-        button("mdi-redo", "Redo (Ctrl+Shift+Z)", viewer.editing.redo, disabled="!can_redo", test="redo")
+        button(
+            "mdi-undo",
+            "Undo (Ctrl+Z)",
+            "trigger('undo')",
+            disabled="!can_undo && !edit_pending",
+            test="undo",
+        )
+        button("mdi-redo", "Redo (Ctrl+Shift+Z)", "trigger('redo')", disabled="!can_redo", test="redo")
         v3.VSpacer()
         with html.Div(style="width: 220px", v_show="documents.length"):
             select(
@@ -191,6 +206,7 @@ def _lobes(viewer: "Viewer") -> None:
                     89,
                     unit="degrees",
                     step=1,
+                    bound=True,
                     test="theta_i",
                     help="Where light comes from, measured from the normal; orange arrow. Blue: the mirror direction.",
                 )
@@ -214,7 +230,7 @@ def _figures() -> None:
             ),
             classes="mr-2",
         )
-        with html.Div(v_show="figure === 'line'", classes="d-flex"):
+        with html.Div(v_if="figure === 'line'", classes="d-flex"):
             with v3.VBtnToggle(
                 v_model=("line_axis",),
                 mandatory=True,
@@ -229,7 +245,8 @@ def _figures() -> None:
             toggle("line_scale", (("log", "log", "Decades"), ("linear", "lin", "Linear")))
 
     with panel("figures", "Figures", head):
-        with html.Div(classes="figure-room", v_show="figure !== 'numbers'"):
+        with html.Div(classes=("stale_figures ? 'figure-room stale' : 'figure-room'",), v_show="figure !== 'numbers'"):
+            stale("figures")
             client.SizeObserver("figure_size")
             html.Div(v_html=("figure_svg",), classes="figure", **marks(data_test="figure"))
         with (
@@ -289,6 +306,7 @@ def _preview(viewer: "Viewer") -> None:
                 6,
                 unit="EV",
                 step=0.1,
+                bound=True,
                 test="exposure",
                 low=-10,
                 high=10,

@@ -36,6 +36,12 @@ class Picking:
         self._picked: list[int] = []
         self._of: SplineBrdf | None = None
         self._inserting: asyncio.Task[None] | None = None
+        self.state.change("mode")(self._mode_changed)
+
+    def _mode_changed(self, mode: Any, **_: Any) -> None:
+        # What is to be picked has to be seen.
+        if mode == "pick":
+            self.state.show_net = True
 
     def clicked(self, x: float, y: float, shift: bool) -> None:
         """Pick the control point there, or insert a knot there, as the mode says."""
@@ -45,12 +51,18 @@ class Picking:
         if self.state.mode == "pick":
             points = volume.net_points(viewer.shown)
             found = viewer.volume.scene.nearest_point(points, x, y, POINT_REACH)
-            if found is not None:
-                with self.state:
+            with self.state:
+                if found is None:
+                    self.state.toast = "There is no control point."
+                else:
                     self.pick(found, more=shift)
+                    self.state.tab = "edit"
         elif self.state.mode == "knot":
             place = viewer.volume.scene.place_on_axis(x, y, AXIS_REACH)
-            if place is not None and 0 < place[1] < 1:
+            if place is None or not 0 < place[1] < 1:
+                with self.state:
+                    self.state.toast = "Click on one of the three axes with numbers: a knot is inserted there."
+            else:
                 # The loop itself would not hold it.
                 self._inserting = asyncio.get_running_loop().create_task(viewer.editing.insert_knot(*place))
 

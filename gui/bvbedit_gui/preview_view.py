@@ -93,6 +93,7 @@ class PreviewView:
         self._shown = wish
         with self.state:
             self.state.error_preview = told
+            self._viewer.fresh("preview")
 
     def _show(self, wish: Wish, seen: Seen) -> None:
         if wish is not self._wish:
@@ -100,6 +101,7 @@ class PreviewView:
         self.seen, self._shown = seen, wish
         with self.state:
             self.state.error_preview = ""
+            self._viewer.fresh("preview")
             self.compose()
 
     def compose(self) -> None:
@@ -109,11 +111,13 @@ class PreviewView:
             return
         exposure = real(self.state.exposure, 0.0, -10.0, 10.0)
         picture, found, gain = composed(seen, self.layout, exposure)
-        told = f"{seen.samples} samples a pixel"
+        told = f"{seen.samples} sample{'' if seen.samples == 1 else 's'} a pixel"
         if found is not None:
-            told += f", MAE {255 * found.mae:.2f}, PAE {255 * found.pae:.0f} of 255"
-        if gain > 1:
-            told += f"; differences times {gain:.0f}"
+            parts = [self._viewer.session.here.name, self._viewer.other_name]
+            if self.layout == "difference":
+                parts.append("their difference" + (f" x {gain:.0f}" if gain > 1 else ""))
+            errors = f"mean error (MAE) {255 * found.mae:.2f}, largest (PAE) {255 * found.pae:.0f} of 255"
+            told = f"From the left: {', '.join(parts)}. {told}; {errors}, at {seen.picture.shape[0]} pixels"
         self.state.preview_note = told
         self.area.show(picture)
         self.send()

@@ -86,6 +86,8 @@ class Saving:
 
     async def _save_model(self, path: Path, precision: str | None, *, pdf: bool) -> None:
         with self._viewer.telling("save"):
+            if self.state.saving:
+                return
             self._check_settled()
             document, key = self._viewer.session.check_save(path), self._viewer.session.current
             assert key is not None  # there is a document

@@ -159,7 +159,8 @@ class Session:
     def recipe(self) -> str:
         """Return how the model came about, as a recipe. Raises BvbError where there is no model."""
         here = self.here
-        output = here.path.name if here.path is not None else f"{Path(here.name).stem}-edited.bvb"
+        # Not the file itself: the recipe may need it, and is to be compared with it.
+        output = f"{(here.path or Path(here.name)).stem}-again.bvb"
         return to_toml(relative_to(self.places.folder, here.known_document.recipe()), [output])
 
     def keep(self) -> None:

@@ -8,7 +8,19 @@ from trame.widgets import vuetify3 as v3
 from bvbedit.edit.operations import OPERATIONS
 from bvbedit_gui.editing import OFFERED
 from bvbedit_gui.knobs import ANGLES, is_regional, knobs_of
-from bvbedit_gui.widgets import COMPACT, axis_name, hint, knob_row, marks, message, number_row, select, toggle, variable
+from bvbedit_gui.widgets import (
+    COMPACT,
+    ENTER,
+    axis_name,
+    hint,
+    knob_row,
+    marks,
+    message,
+    number_row,
+    select,
+    toggle,
+    variable,
+)
 
 if TYPE_CHECKING:
     from bvbedit_gui.viewer import Viewer
@@ -46,8 +58,11 @@ def _edit(viewer: "Viewer") -> None:
         html.A("Fit it with a model first.", href="#", click="tab = 'fit'", click_prevent=True)
     with v3.VAlert(v_if="kept_here", type="warning", variant="tonal", density="compact", classes="ma-2 text-body-2"):
         html.Div("Unsaved work on {{ kept_here }} was kept when the viewer ended.")
-        v3.VBtn("Recover", size="x-small", color="primary", click=(viewer.opening.recover, "[kept_here]"))
+        v3.VBtn(
+            "Recover", size="x-small", color="primary", click=(viewer.started(viewer.opening.recover), "[kept_here]")
+        )
         v3.VBtn("Discard", size="x-small", variant="text", click=(viewer.opening.discard_kept, "[kept_here]"))
+        message("open")
     with html.Div(v_show="is_model", classes="pa-2"):
         items = [{"value": op, "title": op.replace("_", " ")} for op in OFFERED]
         select("edit", "op", (f"{items}",))
@@ -64,13 +79,19 @@ def _edit(viewer: "Viewer") -> None:
         html.Div(
             "{{ edit_note }}", v_show="edit_note", classes="text-caption mt-1 note", **marks(data_test="edit note")
         )
+        html.Div(
+            "{{ albedo_note }}",
+            v_show="albedo_note",
+            classes=("albedo_above ? 'text-caption mt-1 note text-error' : 'text-caption mt-1 note'",),
+            **marks(data_test="albedo note"),
+        )
         message("edit")
         with html.Div(classes="foot d-flex align-center mt-2"):
             v3.VBtn(
                 "Apply",
                 color="primary",
                 size="small",
-                click=viewer.editing.apply,
+                click=viewer.started(viewer.editing.apply),
                 classes="mr-2",
                 **marks(data_test="apply"),
             )
@@ -256,7 +277,7 @@ def _fit(viewer: "Viewer") -> None:
                 "Fit",
                 color="primary",
                 size="small",
-                click=viewer.fitting.fit,
+                click=viewer.started(viewer.fitting.fit),
                 disabled=("fitting || !documents.length",),
                 classes="mr-2",
                 **marks(data_test="fit"),
@@ -298,6 +319,7 @@ def _view() -> None:
             1,
             6,
             whole=True,
+            bound=True,
             test="iso_count",
             help="How many: that of the slider, and others at lower values.",
         )
@@ -311,6 +333,7 @@ def _view() -> None:
             step=0.05,
             low=0.01,
             high=10,
+            bound=True,
             test="iso_gap",
             help="How far the surfaces' values are from one another.",
         )
@@ -323,6 +346,7 @@ def _view() -> None:
             step=0.05,
             low=0.02,
             high=1,
+            bound=True,
             test="opacity",
             help="Lower values let inner surfaces show through.",
         )
@@ -382,7 +406,7 @@ def _history(viewer: "Viewer") -> None:
                 key=("n",),
                 active=("step.here",),
                 disabled=("step.past",),
-                click=(viewer.editing.go_to, "[step.position]"),
+                click=(viewer.started(viewer.editing.go_to), "[step.position]"),
                 classes="px-2",
                 density="compact",
             ),
@@ -391,11 +415,12 @@ def _history(viewer: "Viewer") -> None:
             html.Span("{{ step.past ? 'before' : step.position }}", classes="step-number")
             html.Span("{{ step.line }}")
             v3.VChip("{{ step.name }}", v_if="step.name", size="x-small", classes="ml-1")
-        with html.Div(v_show="is_model", classes="d-flex align-center mt-2"):
+        with html.Div(v_if="is_model", classes="d-flex align-center mt-2"):
             v3.VTextField(
                 label="name of this state",
                 v_model=("named",),
                 keydown_enter=viewer.editing.name_state,
+                **ENTER,
                 **marks(data_test="named"),
                 **COMPACT,
             )

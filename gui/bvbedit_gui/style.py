@@ -13,6 +13,9 @@ html { overflow: hidden !important; }
 .panel-head { display: flex; align-items: center; height: 32px; padding: 0 4px 0 8px; flex: none; }
 /* Pictures are as large as their areas in whole pixels: scaled by a fraction of one, text would blur. */
 .picture { flex: 1; min-height: 0; position: relative; overflow: hidden; }
+.stale > :not(.stale-word), .figure-room.stale .figure { opacity: .12; }
+.stale-word { position: absolute; inset: 0; display: flex; align-items: center; justify-content: center; z-index: 2;
+  pointer-events: none; }
 .controls { flex: none; }
 .note { opacity: .8; line-height: 16px !important; flex: none; overflow-wrap: anywhere; }
 .side { width: 320px; flex: none; display: flex; flex-direction: column; border-left: 1px solid rgba(128,128,128,.35);
@@ -66,6 +69,7 @@ html { overflow: hidden !important; }
 .small .v-select__selection-text { font-size: 13px; }
 .v-btn-toggle { height: 26px !important; }
 .v-btn-toggle .v-btn { min-width: 30px; padding: 0 8px; height: 26px !important; text-transform: none; }
+.v-switch { margin-left: 6px; }
 .v-switch .v-label { font-size: 13px; }
 """
 
@@ -82,6 +86,15 @@ SCRIPT = """
     if (!name || (typing && name !== "save") || !window.trame) return;
     event.preventDefault();
     window.trame.trigger(name);
+  });
+  // Expressions of the page know nothing of the browser's clipboard.
+  document.addEventListener("click", function (event) {
+    const button = event.target.closest && event.target.closest("[data-copies]");
+    if (!button) return;
+    const tell = text => window.trame.state.set("toast", text);
+    const refused = () => tell("The browser does not let pages copy: select the text, and copy it by Ctrl+C.");
+    if (!navigator.clipboard) return refused();
+    navigator.clipboard.writeText(window.trame.state.get(button.dataset.copies)).then(() => tell("Copied"), refused);
   });
   function asks() { return window.trame && window.trame.state && window.trame.state.get("unsaved"); }
   window.addEventListener("beforeunload", function (event) { if (asks()) event.preventDefault(); });

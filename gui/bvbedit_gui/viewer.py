@@ -6,7 +6,7 @@ own, which owns its variables of the page.
 """
 
 import asyncio
-from collections.abc import Iterator
+from collections.abc import Callable, Coroutine, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from typing import Any
@@ -16,6 +16,7 @@ from bvbedit.brdf.charts import HALF_DIFF, Chart
 from bvbedit.brdf.spline_brdf import SplineBrdf
 from bvbedit.edit.document import Document
 from bvbedit_gui.editing import Editing
+from bvbedit_gui.energy_view import EnergyView
 from bvbedit_gui.figures_view import FiguresView
 from bvbedit_gui.fit_view import FitView
 from bvbedit_gui.given import one_of
@@ -32,6 +33,7 @@ from bvbedit_gui.words import of_error, of_history
 
 # Where messages appear: beside what they are about.
 PLACES = ("open", "save", "edit", "fit", "volume", "lobes", "preview", "figures")
+PANELS = ("volume", "lobes", "figures", "preview")
 # What the state of the page is compared with, besides the source material and other documents.
 NOTHING, SOURCE, BEFORE = "nothing", "source", "before"
 STARTS: dict[str, Any] = {
@@ -56,15 +58,19 @@ class Viewer:
         self.server = server
         self.state = server.state
         self.session = session
+        self._begun: set[asyncio.Task[None]] = set()
         self.pool = ThreadPoolExecutor(3, thread_name_prefix="viewer")
         for place in PLACES:
             self.state[f"error_{place}"] = ""
+        for panel in PANELS:
+            self.state[f"stale_{panel}"] = False
         self.state.update(STARTS)
         theme = THEMES[self.state.theme]
         self.volume = VolumeView(self, theme)
         self.lobes = LobeView(self)
         self.preview = PreviewView(self, theme, passes=passes)
         self.figures = FiguresView(self)
+        self.energy = EnergyView(self)
         self.picking = Picking(self)
         self.opening = Opening(self)
         self.editing = Editing(self)
@@ -72,6 +78,26 @@ class Viewer:
         self.saving = Saving(self)
         self.state.change("theme")(self._theme_changed)
         self.state.change("against")(self._against_changed)
+
+    def started(self, method: Callable[..., Coroutine[Any, Any, None]]) -> Callable[..., Coroutine[Any, Any, None]]:
+        """Return what begins a method and does not wait for its end.
+
+        What a page asks for is handled one after the other: who waited for a fit would not hear that it is to stop.
+        """
+
+        async def start(*args: Any, **options: Any) -> None:
+            async def whole() -> None:
+                with self.state:
+                    await method(*args, **options)
+
+            task = asyncio.get_running_loop().create_task(whole())
+            # The loop itself would not hold it.
+            self._begun.add(task)
+            task.add_done_callback(self._begun.discard)
+            # It goes as far as it can at once: what the page asks for next comes after that.
+            await asyncio.sleep(0)
+
+        return start
 
     def start(self) -> None:
         """Show what is open already. Needs a running event loop."""
@@ -116,6 +142,12 @@ class Viewer:
         return next((o.shown for key, o in self.session if against == f"document {key}"), None)
 
     @property
+    def other_name(self) -> str:
+        """The name of what it is compared with."""
+        items = {item["value"]: item["title"] for item in self.state.against_items}
+        return str(items.get(self.state.against, ""))
+
+    @property
     def chart(self) -> Chart:
         """The chart over whose box the volume is shown."""
         shown = self.shown
@@ -127,6 +159,7 @@ class Viewer:
         self.lobes.refresh()
         self.preview.refresh()
         self.figures.refresh()
+        self.energy.refresh()
 
     def latest(self, place: str, rest: float = 0.0) -> Latest:
         """Return a queue of length one in the viewer's threads, whose failures are told at ``place``."""
@@ -136,6 +169,12 @@ class Viewer:
         """Show why something could not be done where it was asked for, or take the words away."""
         with self.state:
             self.state[f"error_{place}"] = "" if error is None else of_error(error)
+            self.fresh(place)
+
+    def fresh(self, panel: str) -> None:
+        """Say that a panel shows what it is to show, or why not."""
+        if panel in PANELS:
+            self.state[f"stale_{panel}"] = False
 
     @contextmanager
     def telling(self, place: str) -> Iterator[None]:
@@ -189,6 +228,9 @@ class Viewer:
         state.dialog = ""
         state.against = NOTHING
         self.volume.forget_view()
+        self.fitting.forget()
+        # What is still seen is another material.
+        state.update({f"stale_{panel}": self.session.current is not None for panel in PANELS})
         if self.session.current is not None:
             here = self.session.here
             if here.document is None:
@@ -210,7 +252,7 @@ class Viewer:
     async def settled(self) -> None:
         """Return when all pictures show what they are to show, but for later passes of the preview."""
         while True:
-            views = (self.editing, self.volume, self.lobes, self.figures, self.saving)
+            views = (self.editing, self.volume, self.lobes, self.figures, self.energy, self.saving)
             queues = [view.queue for view in views]
             busy = [queue for queue in queues if queue.busy]
             if not busy and not self.preview.first_pass_due:

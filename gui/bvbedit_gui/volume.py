@@ -89,6 +89,11 @@ class Field:
         low, high = float(np.percentile(sizes, DARKEST)), float(sizes.max())
         return max(low, FLOOR), max(high, FLOOR)
 
+    @cached_property
+    def bright(self) -> float:
+        """What all but a thousandth of the box is below: beyond lie spikes at grazing, and little else."""
+        return max(float(np.quantile(np.abs(self.values), 0.999)), FLOOR)
+
 
 def field(
     brdf: Brdf,
@@ -252,3 +257,12 @@ def axes(chart: Chart) -> tuple[Axis, Axis, Axis]:
         else:
             out.append(Axis(symbol, tuple(ticks), tuple(f"{a:.3g}°" for a in lines[:, 0])))
     return out[0], out[1], out[2]
+
+
+def place_on(chart: Chart, axis: int, at: float) -> str:
+    """Return in words where a parameter lies on its axis: an angle, or a share where the angle depends on others."""
+    symbol = chart.axes[axis].replace("theta", "θ").replace("phi", "φ")
+    points = np.random.default_rng(0).random((8, 3))
+    points[:, axis] = at
+    angles = chart.angles(points)[:, axis]
+    return f"{symbol} = {angles[0]:.4g}°" if np.ptp(angles) < 1e-9 else f"{100 * at:.3g} % of the largest {symbol}"

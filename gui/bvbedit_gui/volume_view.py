@@ -139,7 +139,8 @@ class VolumeView:
         self.field, self.grid = drawn.field, volume.grid(drawn.field)
         low, high = drawn.field.ends
         with self.state:
-            self._bounds(low, high)
+            self._viewer.fresh("volume")
+            self._bounds(drawn.field, low, high)
             self._colours(drawn.field, low, high)
             self.scene.show_chart(drawn.chart)
             self.scene.show_net(*(drawn.net or (None,)))
@@ -150,7 +151,7 @@ class VolumeView:
             self._viewer.picking.show_region()
             self.show_surfaces()
 
-    def _bounds(self, low: float, high: float) -> None:
+    def _bounds(self, drawn: volume.Field, low: float, high: float) -> None:
         """Let the slider span what the field spans, and stand at a value that shows something."""
         state = self.state
         first, last = float(np.floor(20 * np.log10(low)) / 20), float(np.ceil(20 * np.log10(high)) / 20)
@@ -161,7 +162,8 @@ class VolumeView:
         if self._unseen:
             self._unseen = False
             gap = float(np.log10(values[1] / values[0])) if len(values) > 1 else 0.5
-            top = float(np.log10(values[-1])) if values else last
+            bright = [v for v in values if v <= drawn.bright] or values[:1]
+            top = float(np.log10(bright[-1])) if values else last
             state.update({"iso_gap": min(round(gap, 2), 2.0), "iso_count": min(len(values), 3)})
             self._chosen = round(top, 3)
         else:
@@ -254,7 +256,7 @@ def _draw(
 ) -> _Drawn:
     field = volume.field(shown, chart, what, other, sample)
     # Here, in a thread, and not when the page waits for surfaces.
-    _ = field.ends, field.levels
+    _ = field.ends, field.bright, field.levels
     net, knots_of = None, None
     if isinstance(shown, SplineBrdf):
         if with_net:

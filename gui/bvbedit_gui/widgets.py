@@ -1,5 +1,6 @@
 """Small parts of the page, each used in several panels: fields with sliders, messages, pictures with a title."""
 
+import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from html import escape
@@ -11,11 +12,23 @@ from trame.widgets import vuetify3 as v3
 from bvbedit_gui.knobs import Knob
 
 COMPACT = {"density": "compact", "hide_details": True, "variant": "outlined"}
+# Trame leaves out events that it does not know to be a widget's.
+ENTER = {"__events": [("keydown_enter", "keydown.enter")]}
 
 
 def marks(**names: str) -> dict[str, Any]:
-    """Return attributes that no widget knows: roles and names for those who do not see, and marks for tests."""
-    return {"raw_attrs": [f'{name.replace("_", "-")}="{escape(value)}"' for name, value in names.items()]}
+    """Return attributes that no widget knows: roles and names for those who do not see, and marks for tests.
+
+    Variables of the page may stand in them, as in its texts: ``{{ name }}``.
+    """
+    return {"raw_attrs": [_attribute(name.replace("_", "-"), value) for name, value in names.items()]}
+
+
+def _attribute(name: str, value: str) -> str:
+    if "{{" not in value:
+        return f'{name}="{escape(value)}"'
+    inserted = re.sub(r"{{ (.*?) }}", r"${\1}", value)
+    return f':{name}="`{escape(inserted)}`"'
 
 
 def axis_name(axis: int) -> str:
@@ -119,13 +132,16 @@ def number_row(
     step: float | None = None,
     low: float | None = None,
     high: float | None = None,
+    bound: bool = False,
 ) -> None:
     """Show a number as a slider and a field, with its unit and limits.
 
     ``value`` is an expression of the page, ``assign`` makes a statement that gives it another value. The slider spans
-    ``first`` ... ``last``, in ratios if so; the field takes anything that ``low`` and ``high`` allow.
+    ``first`` ... ``last``, in ratios if so; the field takes anything that ``low`` and ``high`` allow: what
+    lies beyond is told where it is used, or, ``bound``, brought between them.
     """
     shown_low, shown_high = (first if low is None else low), (last if high is None else high)
+    typed = f"Math.min(Math.max(Number($event), {shown_low}), {shown_high})" if bound else "Number($event)"
     limits = f"{_limit(shown_low)} ... {_limit(shown_high)}" + (f" {unit}" if unit else "")
     with html.Div(classes="d-flex align-center knob", **marks(data_test=f"row {test}")):
         with html.Label(label, classes="text-caption knob-label"):
@@ -152,11 +168,11 @@ def number_row(
             track_size=3,
             color="primary",
             **marks(aria_label=f"{label}, slider", data_test=f"slider {test}"),
-            classes="mx-1",
+            classes="mx-2",
         )
         v3.VTextField(
             model_value=(value,),
-            update_modelValue=assign("$event === '' ? null : Number($event)"),
+            update_modelValue=assign(f"$event === '' ? null : {typed}"),
             type="number",
             step="any",
             density="compact",
@@ -213,7 +229,7 @@ def knob_row(knob: Knob) -> None:
         ):
             hint(knob.help)
     elif knob.kind == "choice":
-        select(knob.label, knob.state, (f"{list(knob.options)}",), help=knob.help)
+        select(knob.label, knob.state, (f"{list(knob.options)}",), help=knob.help, classes="small mt-2")
     elif knob.kind == "file":
         select(
             "the other material (.bvb)",
@@ -280,9 +296,15 @@ def panel(name: str, title: str, head: Callable[[], None]) -> Iterator[None]:
         message(name)
 
 
+def stale(name: str) -> None:
+    """Say that a panel shows another material still."""
+    html.Div("working ...", v_if=f"stale_{name}", classes="stale-word text-caption", **marks(data_test=f"stale {name}"))
+
+
 def picture(name: str, area: Any, *, fps: float = 30.0) -> Callable[[], None]:
     """Show an area; return what sends a new picture of it."""
-    with html.Div(classes="picture", **marks(data_picture=name)):
+    with html.Div(classes=(f"stale_{name} ? 'picture stale' : 'picture'",), **marks(data_picture=name)):
+        stale(name)
         view = rca.RemoteControlledArea(
             name=name, display="image", image_style=("{ width: '100%', height: '100%' }",), event_throttle_ms=(30,)
         )

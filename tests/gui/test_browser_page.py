@@ -122,7 +122,7 @@ def test_reload_second_tab_and_a_cut_connection(context, folder, relay):
         second = Desk(context, url)
         assert {name: second.state(name) for name in kept} == before
         # Earlier passes would differ from what is seen after all of them.
-        desk.wait("preview_note", "note => note.startsWith('64 samples')")
+        desk.wait("preview_note", "note => note.includes('64 samples')")
         before_it = desk.picture("preview")
         second.click("tab edit")
         brighten(second, 3)

@@ -156,7 +156,9 @@ def test_a_click_on_an_axis_inserts_a_knot_there(axis, folder):
         assert edit.op == "insert_knots"
         assert edit.axis == axis
         assert edit.at[0] == pytest.approx(0.6, abs=1e-3)
-        assert viewer.state.toast.startswith("A knot at 0.6")
+        # The chart's half angles go with the square of their parameter; of theta_d the limit depends on theta_h.
+        told = {0: "A knot at θ_h = 32.4°", 1: "A knot at 60 % of the largest θ_d", 2: "A knot at φ_d = 54°"}
+        assert viewer.state.toast == told[axis]
         assert viewer.shown.spline.size[axis] == before.spline.size[axis] + 1
         # Where no axis is, nothing is inserted.
         await click(viewer, [0.5, 0.5, 0.5])

@@ -36,7 +36,7 @@ def test_the_first_pass_is_that_of_the_prepared_scene(folder):
         # An edit is shown by the same rays.
         await let(viewer, knob_gain_factor=2.0)
         np.testing.assert_array_equal(viewer.preview.seen.picture, prepared.shade(viewer.shown))
-        assert "1 samples a pixel" in viewer.state.preview_note
+        assert "1 sample a pixel" in viewer.state.preview_note
 
     with_viewer(folder, use, "gold.bvb")
 
@@ -97,12 +97,14 @@ def test_layouts_show_what_it_is_compared_with_and_by_how_much_it_differs(folder
             seen = viewer.preview.seen
             shapes.append(viewer.preview.area._picture.shape)
             found = compare_pictures(seen.picture, seen.other, 0.0)
-            assert f"MAE {255 * found.mae:.2f}, PAE {255 * found.pae:.0f} of 255" in viewer.state.preview_note
+            note = viewer.state.preview_note
+            assert f"(MAE) {255 * found.mae:.2f}, largest (PAE) {255 * found.pae:.0f} of 255" in note
+            assert note.startswith(f"From the left: {viewer.session.here.name}, ")
         sides = [shape[1] / shape[0] for shape in shapes]
         assert sides[0] == 1
         assert 2 < sides[1] < 2.2
         assert 3 < sides[2] < 3.3
-        gain = float(re.search(r"times (\d+)", viewer.state.preview_note).group(1))
+        gain = float(re.search(r"difference x (\d+)", viewer.state.preview_note).group(1))
         height, width, _ = shapes[2]
         ours, theirs, shown = (viewer.preview.area._picture[:, k * (height + 4) :][:, :height] for k in range(3))
         assert width == 3 * height + 8

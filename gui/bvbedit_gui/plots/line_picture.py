@@ -186,8 +186,9 @@ def _residual_limit(residual: Floats, finest: float, *, log: bool) -> float:
     """Return the end of the residual's axis, 1.25 times a round number."""
     seen = np.abs(residual[np.isfinite(residual)])
     largest = float(seen.max(initial=0.0))
-    if log:
-        largest = min(largest, MOST_PERCENT)
+    if log and seen.size:
+        # Where all of it is far off, that is what is to be seen.
+        largest = min(largest, max(MOST_PERCENT, 2 * float(np.median(seen))))
     return 1.25 * nice_step(max(largest, finest) / 1.25)
 
 

@@ -1,0 +1,66 @@
+"""What takes long in the browser: the page goes on meanwhile, and it ends when it is told to."""
+
+from tests.gui.browser import Desk, served
+
+
+def test_a_fit_lets_the_page_go_on_and_stops_when_told(context, folder):
+    with served(folder, "gold.bvb") as viewer:
+        desk = Desk(context, viewer.url)
+        desk.click("tab fit")
+        desk.click("fit_by=size")
+        for axis in range(3):
+            desk.fill(f"fit_size {axis}", 70)
+        desk.click("fit")
+        desk.wait("fitting", "fitting => fitting")
+        # While it is fitted, the server hears what the page says, and draws.
+        before = desk.picture("lobes")
+        desk.fill("theta_i", 15)
+        desk.soon(lambda: desk.known("theta_i"), lambda known: known == 15)
+        desk.soon(lambda: (desk.picture("lobes") != before).any(), bool)
+        assert desk.known("fitting")
+        desk.click("stop")
+        desk.wait("fitting", "fitting => !fitting")
+        assert desk.state("error_fit") == "Stopped. Nothing was changed."
+        assert [step["line"] for step in desk.state("history")] == ["as opened"]
+        # Another one is done to its end, and told until another material is seen.
+        desk.click("fit_by=bytes")
+        desk.fill("fit_kib", 4)
+        desk.click("fit")
+        desk.wait("fit_result", "told => told.includes('log_cosine_rms')")
+        assert [step["line"] for step in desk.state("history")][1].startswith("fit ")
+        desk.open("blue.bvb")
+        desk.wait("fit_result", "told => told === ''")
+        assert desk.complaints == []
+
+
+def test_a_recipe_is_copied_and_a_name_is_saved_by_enter(context, folder):
+    context.grant_permissions(["clipboard-read", "clipboard-write"])
+    with served(folder, "gold.bvb") as viewer:
+        desk = Desk(context, viewer.url)
+        desk.fill("knob_gain_factor", 1.5)
+        desk.wait("edit_pending", "pending => pending")
+        desk.click("apply")
+        desk.wait("history", "history => history.length === 2")
+        desk.click("recipe")
+        desk.click("copy")
+        desk.wait("toast", "toast => toast === 'Copied'")
+        copied = desk.page.evaluate("navigator.clipboard.readText()")
+        assert copied == desk.state("recipe")
+        # It needs the file that was opened, and writes another one.
+        assert 'file = "gold.bvb"' in copied
+        assert 'file = "gold-again.bvb"' in copied
+        desk.page.keyboard.press("Escape")
+
+        desk.click("save as")
+        field = desk.mark("save name").locator("input")
+        field.fill("by-enter")
+        field.press("Enter")
+        desk.soon(lambda: (folder / "by-enter.bvb").exists(), bool)
+        desk.wait("dialog", "dialog => dialog === ''")
+
+        desk.click("tab history")
+        name = desk.mark("named").locator("input")
+        name.fill("brighter")
+        name.press("Enter")
+        desk.wait("history", "history => history[1].name === 'brighter'")
+        assert desk.complaints == []
