@@ -33,6 +33,8 @@ class Opening:
         self.state = viewer.state
         self.state.update(STARTS)
         self.state.samples = [{"name": name, "about": about} for name, about in samples().items()]
+        # Not the page's variable, which a page may set to anything.
+        self._opening = ""
         self.state.folder = str(viewer.session.places.folder)
         self.state.change("current")(self._current_changed)
         self.state.change("dialog")(self._dialog_changed)
@@ -55,13 +57,15 @@ class Opening:
             if known is not None:
                 self.go_to(known)
                 return
-            if self.state.opening:
-                raise BvbError(f"{self.state.opening} is being opened. Wait a moment.")
-            self.state.opening = name
+            if self._opening:
+                raise BvbError(f"{self._opening} is being opened. Wait a moment.")
+            self._opening = self.state.opening = name
             self.state.flush()
             loop = asyncio.get_running_loop()
-            self._opened(await loop.run_in_executor(self._viewer.pool, opened_file, path, path.name))
-        self.state.opening = ""
+            try:
+                self._opened(await loop.run_in_executor(self._viewer.pool, opened_file, path, path.name))
+            finally:
+                self._opening = self.state.opening = ""
 
     @property
     def kept_here(self) -> str:

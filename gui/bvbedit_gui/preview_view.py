@@ -69,6 +69,7 @@ class PreviewView:
             if self.state.error_preview:
                 # Later passes of what was seen before would take the words away.
                 self._wish = self._shown = None
+                self._viewer.fresh("preview")
                 return
         wish = Wish(shown, other, scene, self._side(1 if other is None else 2 if self.layout == "beside" else 3))
         self._wish = wish

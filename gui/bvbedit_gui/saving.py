@@ -37,6 +37,8 @@ class Saving:
         self._viewer = viewer
         self.state = viewer.state
         self.state.update(STARTS)
+        # Not the page's variable, which a page may set to anything.
+        self._busy = False
         self._due: asyncio.TimerHandle | None = None
         self._keepers = ThreadPoolExecutor(1, thread_name_prefix="keep")
         self.queue = Latest(self._keepers, lambda error: viewer.tell("save", error))
@@ -86,12 +88,12 @@ class Saving:
 
     async def _save_model(self, path: Path, precision: str | None, *, pdf: bool) -> None:
         with self._viewer.telling("save"):
-            if self.state.saving:
+            if self._busy:
                 return
             self._check_settled()
             document, key = self._viewer.session.check_save(path), self._viewer.session.current
             assert key is not None  # there is a document
-            self.state.saving = True
+            self._busy = self.state.saving = True
             self.state.flush()
             try:
                 # Its density may have to be built first, and a network's disk be waited for.
@@ -99,7 +101,7 @@ class Saving:
                     self._viewer.pool, partial(document.save, path, precision=precision, pdf=pdf)
                 )
             finally:
-                self.state.saving = False
+                self._busy = self.state.saving = False
             self._viewer.session.saved(path, document, key)
             closing, self.state.closing = self.state.closing, None
             self.state.dialog = ""
@@ -113,16 +115,18 @@ class Saving:
             self.state.error_save = told
 
     async def _export(self, path: Path) -> None:
+        if self._busy:
+            return
         self._check_settled()
         model = self._viewer.session.here.model
         if any(o.measurement is not None and o.measurement.file == path for _, o in self._viewer.session):
             raise BvbError(f"{path.name} is a measurement that is open. Choose another name.")
-        self.state.saving = True
+        self._busy = self.state.saving = True
         self.state.flush()
         try:
             _, missed = await asyncio.get_running_loop().run_in_executor(self._viewer.pool, export, model, path)
         finally:
-            self.state.saving = False
+            self._busy = self.state.saving = False
         self.state.dialog = ""
         shown, error = self._viewer.session.places.shown(path), missed.grid.log_cosine_rms
         self.state.toast = f"Exported {shown}; read back, log_cosine_rms is {error:.2g}"

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from bvbedit.brdf.analytic import Lambert
 from bvbedit.edit.appearance import Gain
 from bvbedit.edit.document import Document, digest
 from bvbedit_gui import saving
@@ -227,5 +228,22 @@ def test_what_was_kept_of_a_file_that_is_open_does_not_open_it_twice(folder):
         assert len(viewer.state.documents) == 1
         assert viewer.session.document.edits[-1].line() == "gain factor=2"
         assert viewer.state.kept_here == ""
+
+    with_viewer(folder, use, "gold.bvb")
+
+
+def test_what_it_was_compared_with_stays_with_what_is_recovered(folder):
+    session = session_of(folder, opened_file(folder / "gold.bvb", "gold.bvb"))
+    edited(session, 1, 2.0)
+    session.keep()
+
+    async def use(viewer):
+        measured = Lambert((0.2, 0.3, 0.4))
+        viewer.session.put(replace(viewer.session.here, reference=measured, reference_name="grey card"))
+        await do(viewer, viewer.opening.recover, "gold.bvb")
+        assert viewer.state.error_open == ""
+        assert viewer.session.document.edits[-1].line() == "gain factor=2"
+        assert viewer.session.here.reference is measured
+        assert (viewer.state.against, viewer.other, viewer.other_name) == ("source", measured, "grey card")
 
     with_viewer(folder, use, "gold.bvb")
