@@ -21,6 +21,8 @@ from bvbedit.spline.compatible import make_compatible
 from bvbedit.spline.sculpting import move_points
 
 LARGEST_REFLECTANCE = 1e5
+# A refit that misses less is hard to tell from what was wanted.
+SEEN = 0.01
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +57,14 @@ class Blend(Regional):
             raise BvbError("The nets are of other charts or encodings and cannot be mixed. Choose space linear or log.")
         # Over the knots of both, that the partner's highlight is met as well; in another chart they mean nothing.
         united = make_compatible(model.spline, other.spline)[0][0] if model.chart is other.chart else model.spline
-        return resampled(model.with_spline(united), self._mixture(model, other, space))
+        mixed = resampled(model.with_spline(united), self._mixture(model, other, space))
+        if model.chart is other.chart or mixed.report["refit_error"] <= SEEN:
+            return mixed
+        note = (
+            f"{self.partner.name} is in chart {other.chart.name}, and what is sharp in it is lost between the knots of "
+            f"this net in {model.chart.name}: fit one of the two in the chart of the other, then blend"
+        )
+        return mixed.told(notes=[note])
 
     def _mixture(self, model: SplineBrdf, other: SplineBrdf, space: str) -> Encoded:
         """Return the encoded values (n, 3) of the mixture at parameters (n, 3) of the model's chart."""

@@ -35,6 +35,8 @@ class Picking:
         self.state.update(STARTS)
         self._picked: list[int] = []
         self._of: SplineBrdf | None = None
+        # What is marked in the picture now.
+        self._shown: tuple[bytes, bytes | None] = b"", None
         self._inserting: asyncio.Task[None] | None = None
         self.state.change("mode")(self._mode_changed)
 
@@ -123,9 +125,8 @@ class Picking:
         """Mark the control points that the edit in the panel reaches, and the one that was picked last."""
         viewer = self._viewer
         model = viewer.shown
-        scene = viewer.volume.scene
         if not isinstance(model, SplineBrdf):
-            scene.show_selected(np.zeros((0, 3)))
+            self._show(np.zeros((0, 3)), None)
             return
         points = volume.net_points(model)
         if any(n >= len(points) for n in self._picked):
@@ -143,5 +144,12 @@ class Picking:
                     chosen = points[reached]
         except (BvbError, TypeError):
             pass  # told beside the knobs
-        scene.show_selected(chosen, marked)
-        viewer.volume.draw()
+        self._show(chosen, marked)
+
+    def _show(self, points: Floats, marked: Floats | None) -> None:
+        # While a knob moves the region stays: a picture of it would only delay that of the result.
+        shown = points.tobytes(), None if marked is None else marked.tobytes()
+        if shown != self._shown:
+            self._shown = shown
+            self._viewer.volume.scene.show_selected(points, marked)
+            self._viewer.volume.draw()

@@ -4,6 +4,7 @@ import logging
 from typing import Any
 
 from bvbedit.brdf.spline_brdf import SplineBrdf
+from bvbedit.edit.combining import SEEN
 from bvbedit.edit.document import Document
 from bvbedit.errors import BvbError
 
@@ -24,9 +25,8 @@ def of_notes(model: SplineBrdf) -> str:
     """Return what an edit has told of its result."""
     notes = list(model.report.get("notes", []))
     missed = model.report.get("refit_error") or 0.0
-    # Less than a thousandth of the largest value nobody sees.
-    if missed > 1e-3 * abs(model.spline.control).max():
-        notes.append(f"missed by at most {missed:.2g} (encoded; the largest is {abs(model.spline.control).max():.2g})")
+    if missed > SEEN:
+        notes.append(f"the net cannot follow: log_cosine_rms {missed:.2g} off (0.01 is hard to see)")
     return "; ".join(notes)
 
 

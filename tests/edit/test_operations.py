@@ -601,6 +601,19 @@ def test_materials_of_any_chart_may_be_blended_again_and_again(space, tmp_path):
     assert mixed.spline.size == one.spline.size
 
 
+def test_a_blend_across_charts_tells_what_its_net_cannot_follow(tmp_path):
+    sharp = bvbedit.fit(GGX(0.03, Schlick((0.9, 0.9, 0.9))), chart="half-diff", encoding="root", size=(20, 8, 6))
+    for name, model in (("sharp", sharp), ("smooth", smooth(HALF_DIFF, Root()))):
+        bvbedit.save(model, tmp_path / f"{name}.bvb")
+
+    def notes_of(chart, partner):
+        return list(Blend(partner=tmp_path / partner, t=0.5).apply(smooth(chart, Root())).report.get("notes", []))
+
+    (note,) = notes_of(IN_OUT, "sharp.bvb")
+    assert note.startswith("sharp.bvb is in chart half-diff, and what is sharp in it is lost between the knots of this")
+    assert notes_of(HALF_DIFF, "sharp.bvb") == []
+
+
 def test_hues_turn_from_red_to_yellow_to_green():
     red, green, blue = colour_matrix(50.0, 1.0) @ [0.8, 0.2, 0.2]
     assert green > 2 * blue
