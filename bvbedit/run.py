@@ -22,6 +22,7 @@ from bvbedit.io import check_target, make_folder
 from bvbedit.io.bvb import load_recipe
 from bvbedit.io.export import export
 from bvbedit.io.files import reading
+from bvbedit.threads import end_with_parent
 
 # Where many materials are run, and the recipe names no file for each.
 EACH = Output("{name}.bvb")
@@ -122,7 +123,9 @@ def _outcomes(jobs: Sequence[Job], workers: int, again: bool) -> Iterator[tuple[
             yield n, attempt(job, again)
         return
     # Spawned: a fork would inherit the locks of running threads.
-    with ProcessPoolExecutor(min(workers, len(jobs)), mp_context=get_context("spawn")) as pool:
+    with ProcessPoolExecutor(
+        min(workers, len(jobs)), mp_context=get_context("spawn"), initializer=end_with_parent
+    ) as pool:
         futures = {pool.submit(attempt, job, again): n for n, job in enumerate(jobs)}
         for future in as_completed(futures):
             n = futures[future]

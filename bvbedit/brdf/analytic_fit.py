@@ -8,6 +8,7 @@ goes on on many. Of those measurements, 8 starts found what 40 or 64 did.
 """
 
 import math
+import weakref
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -147,6 +148,9 @@ class _Search:
         import nlopt
 
         optimizer = nlopt.opt(nlopt.LD_SLSQP, len(self.start))
+        # NLopt holds its objective where Python's garbage collector does not see it: one that held the optimizer would
+        # keep both, and all data, for ever.
+        stop = weakref.WeakMethod(optimizer.force_stop)
 
         def objective(x: Floats, slopes: Floats) -> float:
             # NLopt may call again after an exception in here, and gives it out as an error of its own without a word.
@@ -154,7 +158,9 @@ class _Search:
                 return self._evaluate(x.copy(), slopes)
             except BaseException as error:
                 self.raised = error
-            optimizer.force_stop()
+            force_stop = stop()
+            if force_stop is not None:
+                force_stop()
             return REFUSED
 
         low, high = self.objective.bounds

@@ -20,6 +20,7 @@ from bvbedit.errors import BvbError
 from bvbedit.io import check_target, make_folder, save
 from bvbedit.io.merl import HEADER
 from bvbedit.spline.arguments import is_whole, shown
+from bvbedit.threads import end_with_parent
 
 GridName = Literal["merl", "paper"]
 SUFFIXES: dict[GridName, str] = {"merl": ".binary", "paper": ".npz"}
@@ -134,7 +135,7 @@ def _made(tasks: Sequence[Task], jobs: int) -> Iterator[str]:
             yield _make(task)
         return
     # Spawned: a fork would inherit the locks of running threads.
-    pool = ProcessPoolExecutor(min(jobs, len(tasks)), mp_context=get_context("spawn"))
+    pool = ProcessPoolExecutor(min(jobs, len(tasks)), mp_context=get_context("spawn"), initializer=end_with_parent)
     try:
         for future in as_completed([pool.submit(_make, task) for task in tasks]):
             yield future.result()

@@ -9,6 +9,7 @@ between them. So gaps do not shrink below a least one, and the equations must st
 start.
 """
 
+import weakref
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -222,6 +223,9 @@ class _Search:
         import nlopt
 
         optimizer = nlopt.opt(nlopt.LD_LBFGS, len(self.gaps.x))
+        # NLopt holds its objective where Python's garbage collector does not see it: one that held the optimizer would
+        # keep both, and all data, for ever.
+        stop = weakref.WeakMethod(optimizer.force_stop)
 
         def objective(x: Floats, slopes: Floats) -> float:
             # NLopt may call again after an exception in here, and gives it out as an error of its own without a word.
@@ -230,7 +234,9 @@ class _Search:
                     return self._evaluate(x.copy(), slopes)
             except BaseException as error:
                 self.raised = error
-            optimizer.force_stop()
+            force_stop = stop()
+            if force_stop is not None:
+                force_stop()
             return REFUSED
 
         optimizer.set_min_objective(objective)

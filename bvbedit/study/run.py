@@ -24,7 +24,7 @@ from bvbedit.io.files import reading, replacing
 from bvbedit.study.cells import Task, measured, versions
 from bvbedit.study.plan import Configuration, Plan
 from bvbedit.study.table import RESULTS, Row, to_csv
-from bvbedit.threads import one_matrix_thread
+from bvbedit.threads import end_with_parent, one_matrix_thread
 
 SUFFIXES = (".binary", ".bsdf", ".npz")
 PLAN, VERSIONS, CELLS = "plan.toml", "versions.json", "cells"
@@ -185,10 +185,12 @@ def _pool(jobs: int) -> Iterator[Executor]:
 
 
 def _share(jobs: int) -> None:
-    """Let a process use its share of the processors, and leave Ctrl-C to who has started it."""
+    """Let a process use its share of the processors, leave Ctrl-C to who has started it, and end with that one."""
     import signal
 
     import numba
+
+    end_with_parent()
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     numba.set_num_threads(max(1, min(numba.get_num_threads(), (os.cpu_count() or 1) // jobs)))

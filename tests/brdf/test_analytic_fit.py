@@ -1,5 +1,6 @@
 """Fits of analytic models: they find what made a material, the same each time, and fail in words."""
 
+import gc
 import math
 import pickle
 
@@ -21,6 +22,7 @@ from bvbedit.brdf.analytic import (
     Ward,
 )
 from bvbedit.brdf.analytic_fit import MODELS, fit_analytic
+from bvbedit.brdf.analytic_objective import Objective
 from bvbedit.brdf.base import Brdf
 from bvbedit.brdf.charts import RUSINKIEWICZ
 from bvbedit.brdf.geometry import spherical
@@ -255,3 +257,14 @@ def test_an_interruption_is_passed_on(monkeypatch):
     monkeypatch.setattr(analytic_fit.Objective, "__call__", interrupted)
     with pytest.raises(KeyboardInterrupt):
         fit_analytic(Lambert(0.5), "ward", starts=1)
+
+
+def test_nothing_of_a_fit_is_kept_afterwards():
+    # NLopt's optimizers are not seen by the garbage collector: one that its objective held would stay for ever.
+    def kept():
+        gc.collect()
+        return sum(isinstance(o, Objective) for o in gc.get_objects())
+
+    before = kept()
+    fit_analytic(Glossy(), "ggx")
+    assert kept() == before

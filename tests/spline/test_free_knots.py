@@ -1,5 +1,6 @@
 """Free knots: an exact gradient, never worse than the start, and never at the price of what lies between the data."""
 
+import gc
 import subprocess
 import sys
 from dataclasses import dataclass, field, replace
@@ -347,6 +348,17 @@ def test_progress_rises_to_one():
     assert reported[0] > 0
     assert reported[-1] == 1.0
     assert len(reported) > 3
+
+
+def test_nothing_of_a_search_is_kept_afterwards():
+    # NLopt's optimizers are not seen by the garbage collector: one that its objective held would stay for ever.
+    def kept():
+        gc.collect()
+        return sum(isinstance(o, free_knots._Search) for o in gc.get_objects())
+
+    before = kept()
+    move_knots(_lines(PEAKS["gauss"]), place_knots("averaged", U, 14, 3), 3)
+    assert kept() == before
 
 
 class _Own(Exception):  # noqa: N818

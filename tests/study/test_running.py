@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -117,15 +118,32 @@ def test_killed_in_the_middle_it_goes_on_to_the_same_table(folder, rows, tmp_pat
     child = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
     try:
         wait_for(lambda: len(list((out / CELLS).glob("*.json"))) >= 2, child)
-    finally:
-        os.killpg(child.pid, signal.SIGKILL)
+        workers = [int(pid) for pid in Path(f"/proc/{child.pid}/task/{child.pid}/children").read_text().split()]
+        child.kill()
         child.wait()
+        # Who works for it ends as well, and gives its memory back.
+        assert workers
+        end = time.monotonic() + 60
+        while any(map(runs, workers)):
+            assert time.monotonic() < end
+            time.sleep(0.02)
+    finally:
+        with suppress(ProcessLookupError):
+            os.killpg(child.pid, signal.SIGKILL)
     assert not (out / RESULTS).exists()
     before = {path: path.stat().st_mtime_ns for path in (out / CELLS).glob("*.json")}
     assert 2 <= len(before) < 6
     subprocess.run(command, check=True, capture_output=True)
     assert all(path.stat().st_mtime_ns == changed for path, changed in before.items())
     assert without_times(read_table(out / RESULTS).rows) == without_times(rows)
+
+
+def runs(pid):
+    """Return whether a process is there, and more than a line of the system's table."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
 
 
 def wait_for(condition, child):
