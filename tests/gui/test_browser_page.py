@@ -177,6 +177,7 @@ def test_start_page_sample_errors_and_questions(context, folder):
         desk.click("fit_by=size")
         for axis in range(3):
             desk.fill(f"fit_size {axis}", 5)
+            desk.wait("fit_size", f"size => size[{axis}] === 5")
         desk.click("fit")
         desk.wait("is_model", "model => model")
         desk.wait("fitting", "fitting => !fitting")

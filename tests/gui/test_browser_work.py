@@ -10,6 +10,7 @@ def test_a_fit_lets_the_page_go_on_and_stops_when_told(context, folder):
         desk.click("fit_by=size")
         for axis in range(3):
             desk.fill(f"fit_size {axis}", 70)
+            desk.wait("fit_size", f"size => size[{axis}] === 70")
         desk.click("fit")
         desk.wait("fitting", "fitting => fitting")
         # While it is fitted, the server hears what the page says, and draws.
