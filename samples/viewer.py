@@ -52,7 +52,7 @@ def rest(shown: Any) -> None:
     # What was seen before may have had all of them, too.
     shown.wait_for_timeout(2000)
     shown.wait_for_function(
-        "document.querySelector('[data-test=\"preview note\"]').innerText.startsWith('64 samples')", timeout=60_000
+        "document.querySelector('[data-test=\"preview note\"]').innerText.includes('64 samples')", timeout=60_000
     )
     shown.wait_for_timeout(1500)
 
