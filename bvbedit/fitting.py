@@ -33,6 +33,7 @@ Progress = Callable[[float], None]
 # More of a report, told of the model that has the rest of it.
 Told = Callable[[SplineBrdf], Mapping[str, Any]]
 
+LINEAR = "linear"
 # What ``encoding="auto"`` tries: those that highlights ask for.
 ENCODINGS = ("root", "log")
 # The knee of the error curve is looked for up to so many control points, a file of about 100 KB.
@@ -100,12 +101,7 @@ def wished(
     if isinstance(loss, Distance):
         # Least squares on samples misses most of what E counts, which stands in a few peaks: lofting does not.
         chart = IN_OUT.name if _is_auto(chart) else chart
-        encoding = "linear" if _is_auto(encoding) else encoding
-        if (chart, encoding) != (IN_OUT.name, "linear"):
-            raise BvbError(
-                f"{loss.name} is the paper's error, of its chart and encoding. Choose chart {IN_OUT.name} and encoding "
-                "linear, or another metric."
-            )
+        encoding = LINEAR if _is_auto(encoding) else encoding
     charts = [chart_named(name) for name in (FITTING_CHARTS if _is_auto(chart) else (chart,))]
     if charts[0].name not in FITTING_CHARTS:
         raise BvbError(f"Chart {chart!r} is for tables only. Fit in one of {', '.join((AUTO, *FITTING_CHARTS))}.")
@@ -115,6 +111,11 @@ def wished(
         raise BvbError(f"smoothing is {shown(smoothing)}. Give a strength in 0 ... 1e15, or {AUTO!r}.")
     encodings = tuple(encoding_named(name) for name in (ENCODINGS if _is_auto(encoding) else (encoding,)))
     checked, placement = checked_degrees(degrees), checked_placement(knots)
+    if isinstance(loss, Distance) and not is_published(charts[0], encodings[0], placement, loss):
+        raise BvbError(
+            f"{loss.name} is the paper's error, of its chart and encoding. Choose chart {IN_OUT.name} and encoding "
+            f"{LINEAR}, or another metric."
+        )
     if precision == AUTO:
         # The paper's nets are floats.
         published = len(charts) == 1 and is_published(charts[0], encodings[0], placement, loss)

@@ -8,7 +8,6 @@ goes on on many. Of those measurements, 8 starts found what 40 or 64 did.
 """
 
 import math
-import weakref
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -24,6 +23,7 @@ from bvbedit.brdf.losses import loss_named
 from bvbedit.brdf.samples import drawn
 from bvbedit.errors import BvbError
 from bvbedit.spline.arguments import is_whole, shown
+from bvbedit.spline.nlopt_objective import REFUSED, set_objective
 
 __all__ = ["MODELS", "AnalyticFit", "fit_analytic"]
 
@@ -39,8 +39,6 @@ AGREED = 0.01
 # Errors below this share of the values' own size are hardly followed, by the starts and by the last search: where a
 # model can be exact, the logarithm of the error would have a cusp, at which searches creep.
 ROUNDING, LAST_ROUNDING = 1e-3, 1e-4
-# The value of parameters that are refused: worse than any logarithm of an error.
-REFUSED = 1e4
 # How far starts are spread around the width that the material shows: a factor of e to this power either way.
 SPREAD = 1.2
 # Every so many-th start has another last lobe, where there is a choice.
@@ -136,7 +134,6 @@ class _Search:
     best: float = REFUSED
     best_x: Floats = field(init=False)
     count: int = 0
-    raised: BaseException | None = None
 
     def __post_init__(self) -> None:
         low, high = self.objective.bounds
@@ -148,23 +145,8 @@ class _Search:
         import nlopt
 
         optimizer = nlopt.opt(nlopt.LD_SLSQP, len(self.start))
-        # NLopt holds its objective where Python's garbage collector does not see it: one that held the optimizer would
-        # keep both, and all data, for ever.
-        stop = weakref.WeakMethod(optimizer.force_stop)
-
-        def objective(x: Floats, slopes: Floats) -> float:
-            # NLopt may call again after an exception in here, and gives it out as an error of its own without a word.
-            try:
-                return self._evaluate(x.copy(), slopes)
-            except BaseException as error:
-                self.raised = error
-            force_stop = stop()
-            if force_stop is not None:
-                force_stop()
-            return REFUSED
-
         low, high = self.objective.bounds
-        optimizer.set_min_objective(objective)
+        raised = set_objective(optimizer, self._evaluate)
         optimizer.set_lower_bounds(low)
         optimizer.set_upper_bounds(high)
         optimizer.set_ftol_abs(tolerance)
@@ -172,8 +154,8 @@ class _Search:
         # Rounding ends a line search by an exception, of a type that depends on the version: the best is kept.
         with suppress(Exception):
             optimizer.optimize(self.start)
-        if self.raised is not None:
-            raise self.raised
+        if raised:
+            raise raised[0]
         return self
 
     def _evaluate(self, x: Floats, slopes: Floats) -> float:

@@ -84,18 +84,22 @@ class Fores(Loss):
         return np.broadcast_to(cos_i, f.shape)
 
 
-@dataclass(frozen=True)
-class RelativeL1(Loss):
-    """T = f, absolute; the metric takes lengths of RGB vectors, this the sum of their components."""
-
-    name: str = "relative_l1"
-    power: float = 1.0
+class Plain(Loss):
+    """T = f."""
 
     def transform(self, f: Floats, cos_i: Floats, cos_o: Floats) -> Floats:
         return f
 
     def slope(self, f: Floats, cos_i: Floats, cos_o: Floats) -> Floats:
         return np.ones_like(f)
+
+
+@dataclass(frozen=True)
+class RelativeL1(Plain):
+    """Absolute differences; the metric takes lengths of RGB vectors, this the sum of their components."""
+
+    name: str = "relative_l1"
+    power: float = 1.0
 
     def metric(self, norm: float, target: Floats) -> float:
         mean = float(np.mean(np.abs(target))) if target.size else 0.0
@@ -103,17 +107,11 @@ class RelativeL1(Loss):
 
 
 @dataclass(frozen=True)
-class Distance(Loss):
-    """T = f, squared: the distances E of Lee & Park (2008), eq. 7, whose highlights count above all else."""
+class Distance(Plain):
+    """Squares of the distances E of Lee & Park (2008), eq. 7, whose highlights count above all else."""
 
     name: str = "e_rms"
     power: float = 2.0
-
-    def transform(self, f: Floats, cos_i: Floats, cos_o: Floats) -> Floats:
-        return f
-
-    def slope(self, f: Floats, cos_i: Floats, cos_o: Floats) -> Floats:
-        return np.ones_like(f)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,6 @@ between them. So gaps do not shrink below a least one, and the equations must st
 start.
 """
 
-import weakref
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -21,6 +20,7 @@ from bvbedit.spline.arguments import is_whole, shown
 from bvbedit.spline.banded import SMALLEST_PIVOT
 from bvbedit.spline.basis import Indices
 from bvbedit.spline.knots import Floats, checked_knots
+from bvbedit.spline.nlopt_objective import REFUSED, set_objective
 
 # The three limits were chosen on the axes of three measurements in both charts, fitted at every other node and looked
 # at between these (8 to 24 control points over 46 or 91 nodes, starts from dominant points). With them the error at the
@@ -36,9 +36,6 @@ CONDITION_GROWTH = 2.0
 TOLERANCE = 1e-6
 # A squared error below this share of the lines' squared norm is rounding.
 ROUNDING = 1e-30
-# The value of knots that are refused: worse than any logarithm of an error, yet near enough for a line search to come
-# back from.
-REFUSED = 1e4
 
 
 @dataclass(frozen=True)
@@ -204,7 +201,6 @@ class _Search:
     should_stop: Callable[[], bool] | None
     count: int = 0
     stopped: str = ""
-    raised: BaseException | None = None
     gaps: _Gaps = field(init=False)
     best_knots: Floats = field(init=False)
     best_error: float = field(init=False)
@@ -223,23 +219,7 @@ class _Search:
         import nlopt
 
         optimizer = nlopt.opt(nlopt.LD_LBFGS, len(self.gaps.x))
-        # NLopt holds its objective where Python's garbage collector does not see it: one that held the optimizer would
-        # keep both, and all data, for ever.
-        stop = weakref.WeakMethod(optimizer.force_stop)
-
-        def objective(x: Floats, slopes: Floats) -> float:
-            # NLopt may call again after an exception in here, and gives it out as an error of its own without a word.
-            try:
-                if not self._over():
-                    return self._evaluate(x.copy(), slopes)
-            except BaseException as error:
-                self.raised = error
-            force_stop = stop()
-            if force_stop is not None:
-                force_stop()
-            return REFUSED
-
-        optimizer.set_min_objective(objective)
+        raised = set_objective(optimizer, lambda x, slopes: None if self._over() else self._evaluate(x, slopes))
         optimizer.set_ftol_abs(TOLERANCE)
         reason = "converged"
         try:
@@ -247,12 +227,12 @@ class _Search:
         except Exception:
             # Its line search often gives up by an exception, of a type that depends on the version.
             reason = "no better step was found"
-        if self.raised is not None:
-            raise self.raised
+        if raised:
+            raise raised[0]
         return self.stopped or reason
 
     def _over(self) -> bool:
-        if self.stopped or self.raised is not None:
+        if self.stopped:
             return True
         if self.should_stop is not None and self.should_stop():
             self.stopped = "stopped on request"

@@ -191,7 +191,6 @@ def _share(jobs: int) -> None:
     import numba
 
     end_with_parent()
-
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     numba.set_num_threads(max(1, min(numba.get_num_threads(), (os.cpu_count() or 1) // jobs)))
 

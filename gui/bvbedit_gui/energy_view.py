@@ -2,21 +2,15 @@
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from bvbedit.brdf.albedo import albedo
 from bvbedit.brdf.spline_brdf import SplineBrdf
+from bvbedit_gui.plots.albedos import AlbedoCurve, albedo_curve
 
 if TYPE_CHECKING:
     from bvbedit_gui.viewer import Viewer
 
 STARTS: dict[str, Any] = {"albedo_note": "", "albedo_above": False}
-# Elevations at which the albedo is looked at, below the rim, where measurements say little.
-ELEVATIONS = np.radians(np.arange(0.0, 86.0, 5.0))
 # Seconds to wait before: it is less urgent than pictures.
 REST = 0.2
-# What is above one by less is the error of the integral.
-SLACK = 1.002
 
 
 class EnergyView:
@@ -27,32 +21,36 @@ class EnergyView:
         self.state = viewer.state
         self.state.update(STARTS)
         self.queue = viewer.latest("edit", REST)
+        # Of the model that was looked at last without an edit: while a knob moves it stays.
+        self._known: tuple[SplineBrdf, AlbedoCurve] | None = None
 
     def refresh(self) -> None:
         """Look anew."""
         shown, document = self._viewer.shown, self._viewer.document
         if not isinstance(shown, SplineBrdf) or document is None:
+            self.queue.forget()
             self.state.update(STARTS)
             return
         tried = self._viewer.editing.pending is not None
         self.queue.ask(
-            lambda: (largest_albedo(shown), largest_albedo(document.model) if tried else None),
+            lambda: (albedo_curve(shown) if tried else self._of(shown), self._of(document.model) if tried else None),
             lambda found: self._show(*found),
         )
 
-    def _show(self, now: float, before: float | None) -> None:
-        told = f"Reflects at most {_percent(now)} of the light"
+    def _of(self, model: SplineBrdf) -> AlbedoCurve:
+        known = self._known
+        if known is None or known[0] is not model:
+            self._known = known = model, albedo_curve(model)
+        return known[1]
+
+    def _show(self, now: AlbedoCurve, before: AlbedoCurve | None) -> None:
+        told = f"Reflects at most {_percent(now.largest[0])} of the light"
         if before is not None:
-            told += f" (before the edit {_percent(before)})"
-        above = now > SLACK
+            told += f" (before the edit {_percent(before.largest[0])})"
+        above = bool(now.creates_energy)
         with self.state:
             self.state.albedo_note = told + (": more than arrives; make_plausible repairs that." if above else ".")
             self.state.albedo_above = above
-
-
-def largest_albedo(model: SplineBrdf) -> float:
-    """Return the largest directional albedo over elevations and channels."""
-    return float(albedo(model, ELEVATIONS).value.max())
 
 
 def _percent(share: float) -> str:

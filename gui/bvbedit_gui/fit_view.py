@@ -68,30 +68,46 @@ class FitView:
         return options
 
     async def fit(self) -> None:
-        """Fit the measurement, or the present model anew, in another process."""
-        state = self.state
+        """Fit the measurement, or the present model anew, in another process.
+
+        Who works on something else by the time that it ends goes on with that.
+        """
+        state, session = self.state, self._viewer.session
         if self.worker.busy:
             return
         with self._viewer.telling("fit"):
-            here = self._viewer.session.here
-            key = self._viewer.session.current
+            here, key = session.here, session.current
+            assert key is not None  # there is a material
             options = self.options()
             state.update({"fitting": True, "fit_share": 0.0, "fit_result": ""})
             state.flush()
             if state.fit_of == "source":
-                model = await self._fit_measurement(here, key, FitOptions(**options))
+                if here.measurement is None:
+                    raise BvbError("There is no measurement to fit. Open one, or fit the present model.")
+                made = FitOptions(**options)
+                model = await self.worker.run(tasks.fitted, here.measurement, made, progress=self._progress)
+                seen = session.current == key
+                self._put_measured(here, key, made, model)
             else:
-                document = here.known_document
-                edit = Fit(**options)
+                document, edit = here.known_document, Fit(**options)
                 model = await self.worker.run(tasks.refitted, document.model, edit, progress=self._progress)
-                await self._viewer.editing.do(document, edit, model)
-            state.fit_result = of_fit(model)
+                seen = session.current == key
+                if seen:
+                    await self._viewer.editing.do(document, edit, model)
+                else:
+                    self._do_elsewhere(key, document, edit, model)
+            if seen:
+                state.fit_result = of_fit(model)
+            else:
+                state.toast = f"{here.name} is fitted: {of_fit(model)}"
         state.fitting = False
 
-    async def _fit_measurement(self, here: Opened, key: int | None, options: FitOptions) -> SplineBrdf:
-        if here.measurement is None:
-            raise BvbError("There is no measurement to fit. Open one, or fit the present model.")
-        model: SplineBrdf = await self.worker.run(tasks.fitted, here.measurement, options, progress=self._progress)
+    def _put_measured(self, here: Opened, key: int, options: FitOptions, model: SplineBrdf) -> None:
+        """Open the model of a measurement: in the place of that, or beside the model that it has already."""
+        session = self._viewer.session
+        if key not in session:
+            raise Stopped("It was closed meanwhile.")
+        assert here.measurement is not None  # it was fitted
         document = Document.of_fit(model, options, **here.measurement.told())
         fitted = Opened(
             f"{Path(here.name).stem}.bvb",
@@ -100,17 +116,30 @@ class FitView:
             reference_name=here.reference_name,
             measurement=here.measurement,
         )
-        if key is None or key not in self._viewer.session:
-            raise Stopped("It was closed meanwhile.")
+        looked_at = session.current
         if here.document is None:
             # The measurement stays as what the model is compared with.
-            self._viewer.session.put(fitted, key)
-            self._viewer.session.current = key
+            session.put(fitted, key)
         else:
-            self._viewer.session.add(fitted)
-        self._viewer.arrived()
-        self.state.tab = "fit"
-        return model
+            session.add(fitted)
+        if looked_at == key:
+            self._viewer.arrived()
+            self.state.tab = "fit"
+        else:
+            session.current = looked_at
+            self._told_elsewhere()
+
+    def _do_elsewhere(self, key: int, document: Document, edit: Fit, model: SplineBrdf) -> None:
+        """Make a fit a step of the history of a document that is not the one that is worked on now."""
+        session = self._viewer.session
+        if key not in session or session[key].document is not document:
+            raise Stopped("It was closed or has changed meanwhile.")
+        session.put(session[key].with_document(document.done(edit, model)), key)
+        self._told_elsewhere()
+
+    def _told_elsewhere(self) -> None:
+        self._viewer.synchronise()
+        self._viewer.saving.keep_soon()
 
     def _progress(self, share: float) -> None:
         with self.state:

@@ -69,15 +69,17 @@ class LobeScene:
         compared; what is longer is cut there. ``theta_i`` in radians. ``other`` is a second lobe, as a wire over the
         first or beside it.
         """
-        self._model.mapper.dataset = lobes.surface(lobe, scale, peak)
+        vertices = lobes.points(lobe, scale, peak)
+        self._model.mapper.dataset = lobes.surface(lobe, vertices)
         self._model.visibility = True
         self._other.visibility = other is not None and beside != "none"
         shift = APART if self._other.visibility and beside == "beside" else 0.0
         self._model.position = (-shift / 2, 0.0, 0.0)
         if other is not None and beside != "none":
-            self._other.mapper.dataset = (lobes.wire if beside == "wire" else lobes.surface)(other, scale, peak)
+            mesh_of = lobes.wire if beside == "wire" else lobes.surface
+            self._other.mapper.dataset = mesh_of(other, lobes.points(other, scale, peak))
             self._other.position = (shift / 2, 0.0, 0.0)
-        self._ground(scale, peak, lobes.points(lobe, scale, peak), shift)
+        self._ground(scale, peak, vertices, shift)
         self._directions(theta_i, shift)
         width = 1.3 + shift / 2
         if width != self._width:

@@ -101,18 +101,18 @@ def points(shown: Lobe, scale: Encoding, peak: float) -> Floats:
     return np.asarray(shown.wo * radius[:, None])
 
 
-def surface(shown: Lobe, scale: Encoding, peak: float) -> "PolyData":
-    """Return the mesh of a lobe whose vertices are ``points``, coloured, with normals."""
+def surface(shown: Lobe, vertices: Floats) -> "PolyData":
+    """Return the mesh of a lobe, coloured, with normals; its ``vertices`` are ``points``."""
     import pyvista as pv
 
-    mesh: PolyData = pv.PolyData.from_regular_faces(points(shown, scale, peak), cast(Any, shown.triangles))
+    mesh: PolyData = pv.PolyData.from_regular_faces(vertices, cast(Any, shown.triangles))
     mesh.point_data[COLOUR] = shown.colour
     smooth: PolyData = mesh.compute_normals(cell_normals=False, split_vertices=False, consistent_normals=False)
     return smooth
 
 
-def wire(shown: Lobe, scale: Encoding, peak: float) -> "PolyData":
-    """Return every 16th great circle and ring of the mesh of a lobe as lines, coloured; vertices are ``points``."""
+def wire(shown: Lobe, vertices: Floats) -> "PolyData":
+    """Return every 16th great circle and ring of the mesh of a lobe as lines, coloured; see ``surface``."""
     import pyvista as pv
 
     circles = shown.circles
@@ -121,7 +121,7 @@ def wire(shown: Lobe, scale: Encoding, peak: float) -> "PolyData":
     round_lines = [np.append(ring, ring[0]) for ring in index[7::8]]
     out_lines = [np.append(0, index[:, k]) for k in range(0, circles, max(1, circles // 24))]
     lines = np.concatenate([np.append(len(line), line) for line in (*round_lines, *out_lines)])
-    net = pv.PolyData(points(shown, scale, peak), lines=lines)
+    net = pv.PolyData(vertices, lines=lines)
     net.point_data[COLOUR] = shown.colour
     return net
 

@@ -43,6 +43,8 @@ class Wish:
     side: int
     """Pixels of a picture along each side."""
     last: int = LAST
+    names: tuple[str, str] = ("", "")
+    """Of the material and of what it is compared with, for words about the pictures."""
 
 
 @dataclass(frozen=True)

@@ -32,6 +32,7 @@ class PreviewView:
         self.seen: Seen | None = None
         self._wish: Wish | None = None
         self._shown: Wish | None = None
+        self._names = "", ""
         self._loop: asyncio.AbstractEventLoop | None = None
         self._preview = Preview(self._published, self._failed, passes=passes)
         self.state.change("scene")(lambda **_: self.refresh())
@@ -71,7 +72,9 @@ class PreviewView:
                 self._wish = self._shown = None
                 self._viewer.fresh("preview")
                 return
-        wish = Wish(shown, other, scene, self._side(1 if other is None else 2 if self.layout == "beside" else 3))
+        side = self._side(1 if other is None else 2 if self.layout == "beside" else 3)
+        names = self._viewer.session.here.name, self._viewer.other_name
+        wish = Wish(shown, other, scene, side, names=names)
         self._wish = wish
         self._preview.ask(wish)
 
@@ -99,7 +102,7 @@ class PreviewView:
     def _show(self, wish: Wish, seen: Seen) -> None:
         if wish is not self._wish:
             return
-        self.seen, self._shown = seen, wish
+        self.seen, self._shown, self._names = seen, wish, wish.names
         with self.state:
             self.state.error_preview = ""
             self._viewer.fresh("preview")
@@ -114,7 +117,7 @@ class PreviewView:
         picture, found, gain = composed(seen, self.layout, exposure)
         told = f"{seen.samples} sample{'' if seen.samples == 1 else 's'} a pixel"
         if found is not None:
-            parts = [self._viewer.session.here.name, self._viewer.other_name]
+            parts = list(self._names)
             if self.layout == "difference":
                 parts.append("their difference" + (f" x {gain:.0f}" if gain > 1 else ""))
             errors = f"mean error (MAE) {255 * found.mae:.2f}, largest (PAE) {255 * found.pae:.0f} of 255"

@@ -59,6 +59,8 @@ class Viewer:
         self.state = server.state
         self.session = session
         self._begun: set[asyncio.Task[None]] = set()
+        # What the material can be compared with: what the page's variable stands for, and its name.
+        self._others: list[tuple[str, str]] = []
         self.pool = ThreadPoolExecutor(3, thread_name_prefix="viewer")
         for place in PLACES:
             self.state[f"error_{place}"] = ""
@@ -144,8 +146,7 @@ class Viewer:
     @property
     def other_name(self) -> str:
         """The name of what it is compared with."""
-        items = {item["value"]: item["title"] for item in self.state.against_items}
-        return str(items.get(self.state.against, ""))
+        return next((title for value, title in self._others if value == self.state.against), "")
 
     @property
     def chart(self) -> Chart:
@@ -200,14 +201,14 @@ class Viewer:
         state.history = [] if document is None else of_history(document)
         symbols = [name.replace("theta", "θ").replace("phi", "φ") for name in self.chart.axes]
         state.axis_names = symbols
-        items = [{"value": NOTHING, "title": "nothing"}]
+        self._others = [(NOTHING, "nothing")]
         if here is not None and document is not None:
             if here.reference is not None:
-                items.append({"value": SOURCE, "title": here.reference_name})
-            items.append({"value": BEFORE, "title": "before the edits"})
-        items += [{"value": f"document {key}", "title": o.name} for key, o in session if key != session.current]
-        state.against_items = items
-        if state.against not in [item["value"] for item in items]:
+                self._others.append((SOURCE, here.reference_name))
+            self._others.append((BEFORE, "before the edits"))
+        self._others += [(f"document {key}", o.name) for key, o in session if key != session.current]
+        state.against_items = [{"value": value, "title": title} for value, title in self._others]
+        if state.against not in [value for value, _ in self._others]:
             state.against = NOTHING
         self.fitting.synchronise(here)
         state.kept_here = self.opening.kept_here

@@ -178,3 +178,51 @@ def test_without_a_material_there_is_nothing_to_fit(folder):
         assert not viewer.state.fitting
 
     with_viewer(folder, use)
+
+
+@pytest.mark.parametrize("what", ["model", "measurement"])
+def test_who_works_on_something_else_goes_on_with_that(what, folder):
+    model_file(folder, "other.bvb")
+
+    async def use(viewer):
+        if what == "measurement":
+            await do(viewer, viewer.opening.open_sample, "matte-paper")
+        key = viewer.session.current
+        await let(viewer, **QUICK, fit_by="size", fit_size=[5, 5, 4])
+        fitting = asyncio.ensure_future(do(viewer, viewer.fitting.fit))
+        while not viewer.state.fitting:
+            await asyncio.sleep(0.005)
+        await do(viewer, viewer.opening.open_file, "other.bvb")
+        here = viewer.session.current
+        await let(viewer, op="gain", knob_gain_factor=2.0)
+        tried = viewer.editing.pending
+        await fitting
+        assert (viewer.state.error_fit, viewer.state.fit_result) == ("", "")
+        assert "is fitted: half-diff" in viewer.state.toast
+        # What is tried there is still tried, and the other one is fitted, unsaved, and told to be.
+        assert (viewer.session.current, viewer.state.current, viewer.editing.pending) == (here, here, tried)
+        assert viewer.session[key].document.model.spline.size == (5, 5, 4)
+        assert next(o for o in viewer.state.documents if o["key"] == key)["unsaved"]
+        await let(viewer, current=key)
+        assert viewer.shown.spline.size == (5, 5, 4)
+
+    with_viewer(folder, use, "gold.bvb")
+
+
+def test_a_document_that_is_edited_and_left_meanwhile_is_not_fitted(folder):
+    model_file(folder, "other.bvb")
+
+    async def use(viewer):
+        key = viewer.session.current
+        await let(viewer, **QUICK, fit_by="size", fit_size=[5, 5, 4])
+        fitting = asyncio.ensure_future(do(viewer, viewer.fitting.fit))
+        while not viewer.state.fitting:
+            await asyncio.sleep(0.005)
+        await let(viewer, op="gain", knob_gain_factor=2.0)
+        await do(viewer, viewer.editing.apply)
+        await do(viewer, viewer.opening.open_file, "other.bvb")
+        await fitting
+        assert viewer.state.error_fit == "It was closed or has changed meanwhile."
+        assert [edit.op for edit in viewer.session[key].document.edits] == ["gain"]
+
+    with_viewer(folder, use, "gold.bvb")

@@ -29,7 +29,7 @@ def test_the_mesh_covers_the_hemisphere_once(theta_i):
 def test_the_radius_is_the_length_of_the_colour_vector(theta_i):
     brdf = GGX(0.3, Schlick((0.9, 0.6, 0.3)))
     lobe = lobes.lobe(brdf, theta_i)
-    points = np.asarray(lobes.surface(lobe, Linear(), lobe.peak).points, dtype=float) * lobe.peak
+    points = np.asarray(lobes.surface(lobe, lobes.points(lobe, Linear(), lobe.peak)).points, dtype=float) * lobe.peak
     radius = np.linalg.norm(points, axis=1)
     some = radius > 1e-3
     wo = points[some] / radius[some][:, None]
@@ -59,11 +59,11 @@ def test_scales_keep_the_peak_at_one_and_cut_what_exceeds_it():
     lobe = lobes.lobe(GGX(0.2, Schlick((0.9, 0.9, 0.9))), 0.5)
     peak = lobe.peak
     for scale in (Linear(), Root()):
-        radius = np.linalg.norm(lobes.surface(lobe, scale, peak).points, axis=1)
+        radius = np.linalg.norm(lobes.surface(lobe, lobes.points(lobe, scale, peak)).points, axis=1)
         assert radius.max() == pytest.approx(1, rel=1e-6)
         expected = scale.encode(lobe.length / peak)
         np.testing.assert_allclose(radius, expected, atol=1e-6)
-        assert np.linalg.norm(lobes.surface(lobe, scale, peak / 2).points, axis=1).max() == pytest.approx(1, rel=1e-6)
+        assert np.linalg.norm(lobes.points(lobe, scale, peak / 2), axis=1).max() == pytest.approx(1, rel=1e-6)
     assert isinstance(lobes.fitting_scale(lobes.lobe(GGX(0.05, Schlick((0.9, 0.9, 0.9))), 0.5)), Root)
     assert isinstance(lobes.fitting_scale(lobes.lobe(Lambert((0.5, 0.5, 0.5)), 0.1)), Linear)
 

@@ -5,8 +5,7 @@ import threading
 
 import pytest
 
-from bvbedit.brdf.albedo import albedo
-from bvbedit_gui import energy_view
+from bvbedit_gui.plots.albedos import albedo_curve
 from tests.edit.samples import smooth
 from tests.gui.files import dimmed, model_file
 from tests.gui.opengl import needs_opengl
@@ -91,7 +90,7 @@ def test_pictures_of_another_material_are_told_to_be_old_until_they_are_drawn(fo
 def test_how_much_light_is_reflected_is_told_before_and_after(folder):
     async def use(viewer):
         model = viewer.session.here.model
-        now = float(albedo(model, energy_view.ELEVATIONS).value.max())
+        now = albedo_curve(model).largest[0]
         with no_errors(viewer):
             await let(viewer, op="gain", knob_gain_factor=1.0)
             assert viewer.state.albedo_note.startswith(f"Reflects at most {100 * now:.3g}\u00a0% of the light: more")

@@ -11,7 +11,7 @@ from bvbedit.render.prepared import PreparedScene
 from tests.edit.samples import smooth
 from tests.gui.files import dimmed, model_file
 from tests.gui.opengl import needs_opengl
-from tests.gui.viewing import let, no_errors, with_viewer
+from tests.gui.viewing import do, let, no_errors, with_viewer
 
 pytestmark = needs_opengl
 
@@ -154,5 +154,17 @@ def test_a_scene_file_of_the_folder_is_rendered(folder):
         with no_errors(viewer):
             await let(viewer, scene="sky.exr")
         assert np.abs(viewer.preview.seen.picture - before).max() > 0.01
+
+    with_viewer(folder, use, "gold.bvb")
+
+
+def test_words_are_about_the_pictures_that_are_seen_though_all_is_closed(folder):
+    async def use(viewer):
+        await let(viewer, layout="beside", against="before")
+        told = "From the left: gold.bvb, before the edits. 1 sample a pixel"
+        assert viewer.state.preview_note.startswith(told)
+        await do(viewer, viewer.opening.close, discard=True)
+        await let(viewer, exposure=1.0)
+        assert viewer.state.preview_note.startswith(told)
 
     with_viewer(folder, use, "gold.bvb")
