@@ -87,6 +87,22 @@ SCRIPT = """
     event.preventDefault();
     window.trame.trigger(name);
   });
+  // Trame holds changes back while an answer is awaited, and a request would overtake them: an edit would be applied with
+  // the value that stood in the field before. So a request waits for what was typed before it, in its turn.
+  const ask = window.trame.trigger;
+  let turn = Promise.resolve();
+  async function told() {
+    const state = window.trame.state, client = window.trame.client;
+    while (state.dirtyKeys.size && client.isConnected()) {
+      if (!client.isBusy()) state.flush();
+      await new Promise(done => setTimeout(done, 4));
+    }
+  }
+  window.trame.trigger = async function (...request) {
+    turn = turn.then(told, told);
+    await turn;
+    return ask.apply(window.trame, request);
+  };
   // Expressions of the page know nothing of the browser's clipboard.
   document.addEventListener("click", function (event) {
     const button = event.target.closest && event.target.closest("[data-copies]");

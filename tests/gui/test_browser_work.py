@@ -65,3 +65,30 @@ def test_a_recipe_is_copied_and_a_name_is_saved_by_enter(context, folder):
         name.press("Enter")
         desk.wait("history", "history => history[1].name === 'brighter'")
         assert desk.complaints == []
+
+
+def test_what_is_asked_for_comes_after_what_was_typed_before(context, folder):
+    with served(folder, "gold.bvb") as viewer:
+        desk = Desk(context, viewer.url)
+        desk.mark("field knob_gain_factor").wait_for()
+        # While the first value is on its way, the client holds others back.
+        desk.page.evaluate(
+            """() => {
+              window.trame.state.set("theta_i", 12);
+              window.trame.state.set("knob_gain_factor", 3);
+              document.querySelector('[data-test="apply"]').click();
+            }"""
+        )
+        desk.wait("history", "history => history.length === 2")
+        assert desk.state("history")[1]["line"] == "gain factor=3"
+        desk.page.evaluate(
+            """() => {
+              window.trame.state.set("theta_i", 13);
+              window.trame.state.set("knob_gain_factor", 0.5);
+              document.querySelector('[data-test="apply"]').click();
+              window.trame.trigger("undo");
+            }"""
+        )
+        desk.wait("can_redo", "can => can")
+        assert [step["line"] for step in desk.state("history")][2:] == ["gain factor=0.5"]
+        assert desk.complaints == []
