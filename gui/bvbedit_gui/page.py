@@ -16,6 +16,7 @@ from bvbedit_gui.widgets import (
     marks,
     number_row,
     panel,
+    part,
     picture,
     select,
     stale,
@@ -43,17 +44,24 @@ def build(viewer: "Viewer") -> None:
         client.Style(STYLE)
         client.Script(SCRIPT)
         with v3.VApp(theme=("theme",), classes="fill"):
-            _bar(viewer)
+            with part(server, "bar"):
+                _bar(viewer)
             with v3.VMain(classes="fill"):
                 with html.Div(classes="desk", v_show="documents.length"):
                     with html.Div(classes="panels"):
-                        _volume(viewer)
-                        _lobes(viewer)
-                        _figures()
-                        _preview(viewer)
+                        for name, panel_of in (
+                            ("volume", _volume),
+                            ("lobes", _lobes),
+                            ("figures", _figures),
+                            ("preview", _preview),
+                        ):
+                            with part(server, name):
+                                panel_of(viewer)
                     side(viewer)
-                start_page(viewer)
-            dialogs(viewer)
+                with part(server, "start"):
+                    start_page(viewer)
+            with part(server, "dialogs"):
+                dialogs(viewer)
             v3.VSnackbar(
                 "{{ toast }}",
                 model_value=("toast !== ''",),
@@ -219,7 +227,7 @@ def _lobes(viewer: "Viewer") -> None:
                 )
 
 
-def _figures() -> None:
+def _figures(viewer: "Viewer") -> None:
     def head() -> None:
         toggle(
             "figure",

@@ -17,6 +17,7 @@ from bvbedit_gui.widgets import (
     marks,
     message,
     number_row,
+    part,
     select,
     toggle,
     variable,
@@ -42,14 +43,9 @@ def side(viewer: "Viewer") -> None:
             for value, title in TABS:
                 v3.VTab(title, value=value, classes="text-none", min_width=0, **marks(data_test=f"tab {value}"))
         with html.Div(classes="side-room"):
-            with html.Div(v_show="tab === 'edit'"):
-                _edit(viewer)
-            with html.Div(v_show="tab === 'fit'"):
-                _fit(viewer)
-            with html.Div(v_show="tab === 'view'"):
-                _view()
-            with html.Div(v_show="tab === 'history'"):
-                _history(viewer)
+            for name, tab_of in (("edit", _edit), ("fit", _fit), ("view", _view), ("history", _history)):
+                with part(viewer.server, name), html.Div(v_show=f"tab === '{name}'"):
+                    tab_of(viewer)
 
 
 def _edit(viewer: "Viewer") -> None:
@@ -303,7 +299,7 @@ def _fit(viewer: "Viewer") -> None:
         message("fit")
 
 
-def _view() -> None:
+def _view(viewer: "Viewer") -> None:
     with html.Div(classes="pa-2"):
         select(
             "shown",

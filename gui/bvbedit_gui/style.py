@@ -4,6 +4,7 @@ STYLE = """
 html { overflow: hidden !important; }
 .v-theme--dark { --v-theme-surface: 30, 33, 38 !important; --v-theme-background: 30, 33, 38 !important; }
 .fill, .fill .v-application__wrap { height: 100vh; min-height: 0 !important; }
+.part { display: contents; }
 .desk { display: flex; height: calc(100vh - 45px); }
 .panels { flex: 1; min-width: 0; display: grid; gap: 1px; background: rgba(128, 128, 128, .35);
   grid-template-columns: round(54%, 1px) minmax(0, 1fr); grid-template-rows: round(55%, 1px) minmax(0, 1fr); }
