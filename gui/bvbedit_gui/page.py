@@ -49,14 +49,14 @@ def build(viewer: "Viewer") -> None:
             with v3.VMain(classes="fill"):
                 with html.Div(classes="desk", v_show="documents.length"):
                     with html.Div(classes="panels"):
-                        for name, panel_of in (
-                            ("volume", _volume),
-                            ("lobes", _lobes),
-                            ("figures", _figures),
-                            ("preview", _preview),
-                        ):
-                            with part(server, name):
-                                panel_of(viewer)
+                        with part(server, "volume"):
+                            _volume(viewer)
+                        with part(server, "lobes"):
+                            _lobes(viewer)
+                        with part(server, "figures"):
+                            _figures()
+                        with part(server, "preview"):
+                            _preview(viewer)
                     side(viewer)
                 with part(server, "start"):
                     start_page(viewer)
@@ -227,7 +227,7 @@ def _lobes(viewer: "Viewer") -> None:
                 )
 
 
-def _figures(viewer: "Viewer") -> None:
+def _figures() -> None:
     def head() -> None:
         toggle(
             "figure",

@@ -1,5 +1,7 @@
 """The side of the page: editing, fitting, what is shown of the volume, and the history."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from trame.widgets import html
@@ -43,9 +45,20 @@ def side(viewer: "Viewer") -> None:
             for value, title in TABS:
                 v3.VTab(title, value=value, classes="text-none", min_width=0, **marks(data_test=f"tab {value}"))
         with html.Div(classes="side-room"):
-            for name, tab_of in (("edit", _edit), ("fit", _fit), ("view", _view), ("history", _history)):
-                with part(viewer.server, name), html.Div(v_show=f"tab === '{name}'"):
-                    tab_of(viewer)
+            with _tab(viewer, "edit"):
+                _edit(viewer)
+            with _tab(viewer, "fit"):
+                _fit(viewer)
+            with _tab(viewer, "view"):
+                _view()
+            with _tab(viewer, "history"):
+                _history(viewer)
+
+
+@contextmanager
+def _tab(viewer: "Viewer", name: str) -> Iterator[None]:
+    with part(viewer.server, name), html.Div(v_show=f"tab === '{name}'"):
+        yield
 
 
 def _edit(viewer: "Viewer") -> None:
@@ -299,7 +312,7 @@ def _fit(viewer: "Viewer") -> None:
         message("fit")
 
 
-def _view(viewer: "Viewer") -> None:
+def _view() -> None:
     with html.Div(classes="pa-2"):
         select(
             "shown",

@@ -88,8 +88,8 @@ SCRIPT = """
     event.preventDefault();
     window.trame.trigger(name);
   });
-  // Trame holds changes back while an answer is awaited, and a request would overtake them: an edit would be applied with
-  // the value that stood in the field before. So a request waits for what was typed before it, in its turn.
+  // Trame holds changes back while an answer is awaited, and a request would overtake them: an edit would be applied
+  // with the value that stood in the field before. So a request waits for what was typed before it, in its turn.
   const ask = window.trame.trigger;
   let turn = Promise.resolve();
   async function told() {
