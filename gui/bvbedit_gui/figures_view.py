@@ -20,7 +20,8 @@ STARTS: dict[str, Any] = {
     "figure": "line",
     "line_axis": 0,
     "line_scale": "log",
-    "figure_size": {"width": 480, "height": 300},
+    # As the page's observer of sizes sends it, which tells more besides.
+    "figure_size": {"size": {"width": 480, "height": 300}},
     "figure_svg": "",
     "figure_rows": [],
 }
@@ -77,7 +78,9 @@ class FiguresView:
         return whole(state.line_axis, 0, 0, 2), (u, v, w)
 
     def _size(self) -> tuple[int, int]:
-        given = self.state.figure_size if isinstance(self.state.figure_size, dict) else {}
+        told = self.state.figure_size
+        given = told.get("size") if isinstance(told, dict) else None
+        given = given if isinstance(given, dict) else {}
         (low, lower), (high, higher) = SMALLEST, LARGEST
         return whole(given.get("width"), low, low, high), whole(given.get("height"), lower, lower, higher)
 

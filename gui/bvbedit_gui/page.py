@@ -13,6 +13,7 @@ from bvbedit_gui.style import SCRIPT, STYLE
 from bvbedit_gui.widgets import (
     axis_name,
     button,
+    hint,
     marks,
     number_row,
     panel,
@@ -304,7 +305,14 @@ def _preview(viewer: "Viewer") -> None:
 
     with panel("preview", "Preview", head):
         view.send = picture("preview", view.area)
-        html.Div("{{ preview_note }}", classes="text-caption px-2 note", **marks(data_test="preview note"))
+        html.Div(
+            "{{ preview_names }}",
+            classes="text-caption px-2 note line",
+            **marks(title="{{ preview_names }}", data_test="preview names"),
+        )
+        with html.Div(classes="text-caption px-2 note line", **marks(data_test="preview note")):
+            html.Span("{{ preview_note }}")
+            hint("MAE: mean absolute error, PAE: the largest, of the 8-bit picture against the one beside it.")
         with html.Div(classes="px-2 controls"):
             number_row(
                 "exposure",

@@ -3,6 +3,7 @@
 import asyncio
 from typing import TYPE_CHECKING, Any
 
+from bvbedit.brdf.base import Brdf
 from bvbedit_gui import places as files
 from bvbedit_gui.areas import PictureArea
 from bvbedit_gui.given import one_of, real
@@ -16,7 +17,13 @@ SCENES = ("sphere", "studio", "furnace")
 LAYOUTS: tuple[Layout, ...] = ("alone", "beside", "difference")
 # Sides of the pictures that are rendered; they are scaled to the panel.
 SIDES = (128, 192, 256, 320, 384, 512)
-STARTS: dict[str, Any] = {"scene": "sphere", "exposure": 0.0, "layout": "beside", "preview_note": ""}
+STARTS: dict[str, Any] = {
+    "scene": "sphere",
+    "exposure": 0.0,
+    "layout": "beside",
+    "preview_names": "",
+    "preview_note": "",
+}
 
 
 class PreviewView:
@@ -26,7 +33,7 @@ class PreviewView:
         self._viewer = viewer
         self.state = viewer.state
         self.state.update(STARTS)
-        self.area = PictureArea(lambda *_: self.refresh())
+        self.area = PictureArea(lambda *_: self._resized())
         self.area.background = _rgb(theme.paper)
         self.send: Any = lambda: None
         self.seen: Seen | None = None
@@ -72,11 +79,23 @@ class PreviewView:
                 self._wish = self._shown = None
                 self._viewer.fresh("preview")
                 return
-        side = self._side(1 if other is None else 2 if self.layout == "beside" else 3)
+        side = self._side(self._beside(other))
         names = self._viewer.session.here.name, self._viewer.other_name
         wish = Wish(shown, other, scene, side, names=names)
         self._wish = wish
         self._preview.ask(wish)
+
+    def _resized(self) -> None:
+        # Pictures that would be of the same size again are not made again: words that come with them could change the
+        # room that they have, and so for ever.
+        if self._wish is None or self._wish.side != self._side(self._beside(self._wish.other)):
+            self.refresh()
+        else:
+            self.send()
+
+    def _beside(self, other: Brdf | None) -> int:
+        """Return how many pictures stand beside one another."""
+        return 1 if other is None else 2 if self.layout == "beside" else 3
 
     def _side(self, beside: int) -> int:
         width, height = self.area.size
@@ -115,14 +134,15 @@ class PreviewView:
             return
         exposure = real(self.state.exposure, 0.0, -10.0, 10.0)
         picture, found, gain = composed(seen, self.layout, exposure)
-        told = f"{seen.samples} sample{'' if seen.samples == 1 else 's'} a pixel"
+        names, note = self._names[0], f"{seen.samples} sample{'' if seen.samples == 1 else 's'} a pixel"
         if found is not None:
             parts = list(self._names)
             if self.layout == "difference":
                 parts.append("their difference" + (f" x {gain:.0f}" if gain > 1 else ""))
-            errors = f"mean error (MAE) {255 * found.mae:.2f}, largest (PAE) {255 * found.pae:.0f} of 255"
-            told = f"From the left: {', '.join(parts)}. {told}; {errors}, at {seen.picture.shape[0]} pixels"
-        self.state.preview_note = told
+            names = f"From the left: {', '.join(parts)}"
+            note += f"; MAE {255 * found.mae:.2f}, PAE {255 * found.pae:.0f} of 255, at {seen.picture.shape[0]} pixels"
+        self.state.preview_names = names
+        self.state.preview_note = note
         self.area.show(picture)
         self.send()
 

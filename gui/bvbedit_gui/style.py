@@ -18,6 +18,8 @@ html { overflow: hidden !important; }
 .stale-word { position: absolute; inset: 0; display: flex; align-items: center; justify-content: center; z-index: 2;
   pointer-events: none; }
 .controls { flex: none; }
+.note.line { height: 16px; white-space: nowrap; overflow: hidden; text-overflow: ellipsis; }
+.note.text-error { opacity: 1; }
 .note { opacity: .8; line-height: 16px !important; flex: none; overflow-wrap: anywhere; }
 .side { width: 320px; flex: none; display: flex; flex-direction: column; border-left: 1px solid rgba(128,128,128,.35);
   background: rgb(var(--v-theme-surface)); }

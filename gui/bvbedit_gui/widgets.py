@@ -319,7 +319,11 @@ def picture(name: str, area: Any, *, fps: float = 30.0) -> Callable[[], None]:
     with html.Div(classes=(f"stale_{name} ? 'picture stale' : 'picture'",), **marks(data_picture=name)):
         stale(name)
         view = rca.RemoteControlledArea(
-            name=name, display="image", image_style=("{ width: '100%', height: '100%' }",), event_throttle_ms=(30,)
+            name=name,
+            display="image",
+            # Until a picture of another size comes, the last one keeps its proportions.
+            image_style=("{ width: '100%', height: '100%', objectFit: 'contain' }",),
+            event_throttle_ms=(30,),
         )
     handler = view.create_view_handler(area, encoder="jpeg", target_fps=fps, interactive_quality=80, still_quality=95)
     return lambda: handler.update()

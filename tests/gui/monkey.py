@@ -43,7 +43,7 @@ CHOICES: dict[str, tuple[Any, ...]] = {
     "line_axis": (0, 1, 2),
     "line_scale": ("log", "linear"),
     "probe": ([0.3, 0.5, 0.5], [0, 0, 0], [1, 1, 1]),
-    "figure_size": ({"width": 480, "height": 300}, {"width": 0, "height": 0}, {"width": 1e5, "height": 1e5}),
+    "figure_size": tuple({"size": {"width": w, "height": h}} for w, h in ((480, 300), (0, 0), (1e5, 1e5))),
     "scene": ("sphere", "sphere", "sphere", "furnace", "sky.toml", "bad.toml"),
     "exposure": (-10, 0, 1.5, 10),
     "layout": ("alone", "beside", "difference"),

@@ -21,6 +21,12 @@ FOCUSED = """() => {
   return [marked, row].filter(x => x).map(x => x.dataset.test);
 }"""
 
+# By how many pixels an image differs from its room.
+MISFIT = """name => {
+  const room = document.querySelector(`[data-picture="${name}"]`), image = room.querySelector("img");
+  return [image.naturalWidth - room.clientWidth, image.naturalHeight - room.clientHeight];
+}"""
+
 
 def edge(desk, name):
     """Return the commonest colour of the outermost pixels of a picture."""
@@ -100,6 +106,23 @@ def test_by_keyboard_alone(context, folder):
 def apart(a, b):
     """The share of pixels that differ by more than what pictures lose on their way to the page."""
     return (np.abs(a.astype(int) - b) > 12).any(axis=-1).mean()
+
+
+def test_what_is_shown_is_made_as_large_as_its_room(context, folder):
+    with served(folder, "gold.bvb") as viewer:
+        desk = Desk(context, viewer.url)
+        for name in ("volume", "lobes", "preview"):
+            desk.page.locator(f'[data-picture="{name}"] img').wait_for()
+        desk.page.locator(".figure svg").wait_for()
+        for size in ((1280, 720), (1600, 1000)):
+            desk.page.set_viewport_size({"width": size[0], "height": size[1]})
+            for name in ("volume", "lobes", "preview"):
+                desk.soon(lambda name=name: desk.page.evaluate(MISFIT, name), lambda misfit: misfit == [0, 0])
+            width, height = (round(desk.page.locator(".figure").bounding_box()[side]) for side in ("width", "height"))
+            desk.wait("figure_svg", f"""svg => svg.includes('viewBox="0 0 {width} {height}"')""")
+            # However long the words below it are, the picture is not made again for the room that they leave.
+            desk.wait("preview_note", "note => note.includes('64 samples')")
+        assert desk.complaints == []
 
 
 def test_reload_second_tab_and_a_cut_connection(context, folder, relay):

@@ -28,7 +28,7 @@ def test_each_control_of_the_line_draws_another_plot(folder):
             {"line_axis": 2},
             {"line_scale": "linear"},
             {"probe": [0.1, 0.2, 0.3]},
-            {"figure_size": {"width": 700, "height": 400}},
+            {"figure_size": {"size": {"width": 700, "height": 400}}},
             {"theme": "dark"},
             {"against": "document 2"},
         )
@@ -57,8 +57,11 @@ def test_the_place_along_the_line_itself_changes_no_curve(folder):
 
 def test_the_size_is_kept_within_what_can_be_read(folder):
     async def use(viewer):
-        for given, width in (({"width": 1, "height": 1}, 380), ({"width": 1e9, "height": 1e9}, 1600), (None, 380)):
-            await let(viewer, figure_size=given)
+        for given, width in ((1, 380), (700, 700), (1e9, 1600), (None, 380), ("wide", 380)):
+            await let(viewer, figure_size={"size": {"width": given, "height": given}})
+            assert re.search(rf'viewBox="0 0 {width} ', viewer.state.figure_svg)
+        for nonsense, width in ((None, 380), ({"size": 3}, 380), ([7, 8], 380)):
+            await let(viewer, figure_size=nonsense)
             assert re.search(rf'viewBox="0 0 {width} ', viewer.state.figure_svg)
 
     with_viewer(folder, use, "gold.bvb")

@@ -98,13 +98,13 @@ def test_layouts_show_what_it_is_compared_with_and_by_how_much_it_differs(folder
             shapes.append(viewer.preview.area._picture.shape)
             found = compare_pictures(seen.picture, seen.other, 0.0)
             note = viewer.state.preview_note
-            assert f"(MAE) {255 * found.mae:.2f}, largest (PAE) {255 * found.pae:.0f} of 255" in note
-            assert note.startswith(f"From the left: {viewer.session.here.name}, ")
+            assert f"MAE {255 * found.mae:.2f}, PAE {255 * found.pae:.0f} of 255" in note
+            assert viewer.state.preview_names.startswith(f"From the left: {viewer.session.here.name}, ")
         sides = [shape[1] / shape[0] for shape in shapes]
         assert sides[0] == 1
         assert 2 < sides[1] < 2.2
         assert 3 < sides[2] < 3.3
-        gain = float(re.search(r"difference x (\d+)", viewer.state.preview_note).group(1))
+        gain = float(re.search(r"difference x (\d+)", viewer.state.preview_names).group(1))
         height, width, _ = shapes[2]
         ours, theirs, shown = (viewer.preview.area._picture[:, k * (height + 4) :][:, :height] for k in range(3))
         assert width == 3 * height + 8
@@ -161,10 +161,24 @@ def test_a_scene_file_of_the_folder_is_rendered(folder):
 def test_words_are_about_the_pictures_that_are_seen_though_all_is_closed(folder):
     async def use(viewer):
         await let(viewer, layout="beside", against="before")
-        told = "From the left: gold.bvb, before the edits. 1 sample a pixel"
-        assert viewer.state.preview_note.startswith(told)
+        told = "From the left: gold.bvb, before the edits"
+        assert viewer.state.preview_names == told
         await do(viewer, viewer.opening.close, discard=True)
         await let(viewer, exposure=1.0)
-        assert viewer.state.preview_note.startswith(told)
+        assert viewer.state.preview_names == told
+
+    with_viewer(folder, use, "gold.bvb")
+
+
+def test_a_picture_is_made_anew_for_another_size_only_if_it_would_have_one(folder):
+    async def use(viewer):
+        area = viewer.preview.area
+        await do(viewer, area.process_resize_event, 400, 200)
+        seen = viewer.preview.seen
+        await do(viewer, area.process_resize_event, 400, 204)
+        assert viewer.preview.seen is seen
+        assert area.img_cols_rows[0].shape == (204, 400, 3)
+        await do(viewer, area.process_resize_event, 800, 404)
+        assert viewer.preview.seen.picture.shape[0] > seen.picture.shape[0]
 
     with_viewer(folder, use, "gold.bvb")
