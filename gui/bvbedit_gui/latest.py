@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import Callable
 from concurrent.futures import Executor
+from contextlib import suppress
 from typing import Any
 
 
@@ -20,6 +21,7 @@ class Latest:
         self._failed, self._asked = failed, asked
         # Seconds to wait before each piece of work: what is less urgent leaves the processors to what is more.
         self._rest = rest
+        self._awaited = asyncio.Event()
         self._next: tuple[Callable[[], Any], Callable[[Any], object]] | None = None
         self._task: asyncio.Task[None] | None = None
 
@@ -48,15 +50,18 @@ class Latest:
         self._next = (lambda: None), (lambda _: None)
 
     async def done(self) -> None:
-        """Return when nothing is being done and nothing waits."""
+        """Return when nothing is being done and nothing waits; who waits for it lets nothing rest."""
+        self._awaited.set()
         while self._task is not None and not self._task.done():
             await self._task
+        self._awaited.clear()
 
     async def _run(self) -> None:
         loop = asyncio.get_running_loop()
         while self._next is not None:
             if self._rest:
-                await asyncio.sleep(self._rest)
+                with suppress(TimeoutError):
+                    await asyncio.wait_for(self._awaited.wait(), self._rest)
             (work, then), self._next = self._next, None
             try:
                 result = await loop.run_in_executor(self._executor, work)

@@ -113,3 +113,24 @@ def test_what_is_asked_for_while_a_result_is_shown_is_done(pool):
         assert got == [0, 1, 2, 3]
 
     asyncio.run(main())
+
+
+def test_it_rests_unless_it_is_waited_for(pool):
+    async def main():
+        began = []
+        # An hour: only what waits for it can end it.
+        latest = Latest(pool, began.append, rest=3600.0)
+        latest.ask(lambda: began.append("work"), lambda _: None)
+        for _ in range(10):
+            await asyncio.sleep(0.001)
+        assert latest.busy
+        assert began == []
+        await latest.done()
+        assert began == ["work"]
+        short = Latest(pool, began.append, rest=0.01)
+        short.ask(lambda: None, began.append)
+        while short.busy:
+            await asyncio.sleep(0.001)
+        assert began == ["work", None]
+
+    asyncio.run(main())
