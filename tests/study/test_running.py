@@ -224,9 +224,8 @@ def test_a_damaged_measurement_is_a_row(folder, tmp_path):
 def test_a_full_disk_ends_it_in_one_line_and_loses_nothing(folder, tmp_path, monkeypatch):
     from bvbedit.study import run as running
 
-    plan = Plan(
-        series=(Series("s", chart="half-diff", encoding="root", size=((4, 4, 4), (5, 4, 4))),), pictures=Pictures((), 8, 1)
-    )
+    two = Series("s", chart="half-diff", encoding="root", size=((4, 4, 4), (5, 4, 4)))
+    plan = Plan(series=(two,), pictures=Pictures((), 8, 1))
     write, written = running._write, []
 
     def full(place, row):
