@@ -174,6 +174,8 @@ def _iso_row() -> None:
             v_model=("iso",),
             min=("iso_low",),
             max=("iso_high",),
+            # Until the material is seen, its values are not known.
+            disabled=("stale_volume",),
             step=(0.01,),
             density="compact",
             hide_details=True,

@@ -76,7 +76,8 @@ html { overflow: hidden !important; }
 .v-switch .v-label { font-size: 13px; }
 """
 
-# Values that a user is typing are undone by the browser itself, so keys mean the document only elsewhere.
+# Values that a user is typing are undone by the browser itself, so keys mean the document only elsewhere. What trame's
+# client does with changes and requests at the same time is read from trame-client 4.1.
 SCRIPT = """
 (function () {
   if (window.bvbeditKeys) return;
@@ -105,6 +106,24 @@ SCRIPT = """
     turn = turn.then(told, told);
     await turn;
     return ask.apply(window.trame, request);
+  };
+  // A change on its way to the server may cross one that comes from there, and each would keep what the other had: so
+  // the server is asked for what it has in the end. States are made anew with each connection, and keep their listeners.
+  const shared = Object.getPrototypeOf(window.trame.state), flush = shared.flush;
+  const sent = new Set(), crossed = new Set();
+  window.trame.state.addListener(function ({ type, keys }) {
+    if (type !== "dirty-state") return;
+    const own = window.trame.state.dirtyKeys;
+    keys.filter(key => sent.has(key) && !own.has(key)).forEach(key => crossed.add(key));
+  });
+  shared.flush = async function (...names) {
+    const going = this.client.isBusy() ? [] : [...this.dirtyKeys, ...names.flat()];
+    going.forEach(key => sent.add(key));
+    await flush.apply(this, names);
+    going.forEach(key => sent.delete(key));
+    const again = going.filter(key => crossed.delete(key));
+    if (again.length && this.client.isConnected())
+      this.client.getConnection().getSession().call("trame.force.push", again);
   };
   // Expressions of the page know nothing of the browser's clipboard.
   document.addEventListener("click", function (event) {

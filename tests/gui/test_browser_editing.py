@@ -179,6 +179,8 @@ def test_a_session_from_opening_to_a_replayed_recipe(context, folder):
         gold = Document.open(folder / "gold.bvb").model
         desk.open("satin.bvb")
         desk.wait("documents", "documents => documents.length === 2")
+        # Values of its surfaces are chosen when the field is known.
+        desk.wait("stale_volume", "stale => !stale")
         look_at_outlines(desk, bvbedit.load(folder / "satin.bvb"))
         desk.choose("current", "gold.bvb")
         desk.wait("axis_names", "names => names[0] === 'θ_h'")

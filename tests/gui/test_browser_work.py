@@ -92,3 +92,27 @@ def test_what_is_asked_for_comes_after_what_was_typed_before(context, folder):
         desk.wait("can_redo", "can => can")
         assert [step["line"] for step in desk.state("history")][2:] == ["gain factor=0.5"]
         assert desk.complaints == []
+
+
+def test_page_and_server_agree_though_their_changes_have_crossed(context, folder):
+    with served(folder, "gold.bvb") as viewer:
+        desk = Desk(context, viewer.url)
+        desk.page.locator('[data-picture="lobes"] img').wait_for()
+        # What the server has sent arrives while the page's change is on its way.
+        desk.page.evaluate(
+            """async () => {
+              const state = window.trame.state;
+              while (state.client.isBusy()) await new Promise(done => setTimeout(done, 5));
+              const sent = state.set("theta_i", 20);
+              await Promise.resolve();
+              state._updateFromServer({ theta_i: 30 });
+              await sent;
+            }"""
+        )
+        assert desk.known("theta_i") == 20
+        desk.wait("theta_i", "value => value === 20")
+        # And where nothing crosses, changes of both arrive.
+        desk.page.evaluate("() => window.trame.state.set('theta_i', 40)")
+        desk.soon(lambda: desk.known("theta_i"), lambda known: known == 40)
+        assert desk.state("theta_i") == 40
+        assert desk.complaints == []
