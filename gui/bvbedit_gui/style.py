@@ -108,7 +108,7 @@ SCRIPT = """
     return ask.apply(window.trame, request);
   };
   // A change on its way to the server may cross one that comes from there, and each would keep what the other had: so
-  // the server is asked for what it has in the end. States are made anew with each connection, and keep their listeners.
+  // the server is asked for what it has in the end. Each connection has a state of its own, with the same listeners.
   const shared = Object.getPrototypeOf(window.trame.state), flush = shared.flush;
   const sent = new Set(), crossed = new Set();
   window.trame.state.addListener(function ({ type, keys }) {
