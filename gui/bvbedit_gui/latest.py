@@ -52,9 +52,11 @@ class Latest:
     async def done(self) -> None:
         """Return when nothing is being done and nothing waits; who waits for it lets nothing rest."""
         self._awaited.set()
-        while self._task is not None and not self._task.done():
-            await self._task
-        self._awaited.clear()
+        try:
+            while self._task is not None and not self._task.done():
+                await self._task
+        finally:
+            self._awaited.clear()
 
     async def _run(self) -> None:
         loop = asyncio.get_running_loop()

@@ -110,20 +110,22 @@ SCRIPT = """
   // A change on its way to the server may cross one that comes from there, and each would keep what the other had: so
   // the server is asked for what it has in the end. Each connection has a state of its own, with the same listeners.
   const shared = Object.getPrototypeOf(window.trame.state), flush = shared.flush;
-  const sent = new Set(), crossed = new Set();
+  const flights = new Set();
   window.trame.state.addListener(function ({ type, keys }) {
     if (type !== "dirty-state") return;
     const own = window.trame.state.dirtyKeys;
-    keys.filter(key => sent.has(key) && !own.has(key)).forEach(key => crossed.add(key));
+    for (const { sent, crossed } of flights)
+      keys.filter(key => sent.has(key) && !own.has(key)).forEach(key => crossed.add(key));
   });
   shared.flush = async function (...names) {
-    const going = this.client.isBusy() ? [] : [...this.dirtyKeys, ...names.flat()];
-    going.forEach(key => sent.add(key));
+    const sent = new Set(this.client.isBusy() ? [] : [...this.dirtyKeys, ...names.flat()]);
+    // The next one with the same keys begins before this one is known to have ended: each is a flight of its own.
+    const flight = { sent, crossed: new Set() };
+    flights.add(flight);
     await flush.apply(this, names);
-    going.forEach(key => sent.delete(key));
-    const again = going.filter(key => crossed.delete(key));
-    if (again.length && this.client.isConnected())
-      this.client.getConnection().getSession().call("trame.force.push", again);
+    flights.delete(flight);
+    if (flight.crossed.size && this.client.isConnected())
+      this.client.getConnection().getSession().call("trame.force.push", [...flight.crossed]);
   };
   // Expressions of the page know nothing of the browser's clipboard.
   document.addEventListener("click", function (event) {

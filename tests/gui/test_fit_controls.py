@@ -26,6 +26,14 @@ def folder(tmp_path):
     return tmp_path
 
 
+async def begun_fit(viewer):
+    """Return a fit that has begun, to be waited for."""
+    fitting = asyncio.ensure_future(do(viewer, viewer.fitting.fit))
+    while not viewer.state.fitting:
+        await asyncio.sleep(0.005)
+    return fitting
+
+
 @pytest.mark.parametrize(
     ("state", "options"),
     [
@@ -96,9 +104,7 @@ def test_stop_leaves_the_document_and_a_later_fit_works(folder):
     async def use(viewer):
         before = viewer.session.document
         await let(viewer, **QUICK, fit_by="tolerance", fit_tolerance=1e-6)
-        fitting = asyncio.ensure_future(do(viewer, viewer.fitting.fit))
-        while not viewer.state.fitting:
-            await asyncio.sleep(0.005)
+        fitting = await begun_fit(viewer)
         # Others are refused meanwhile, quietly: the button cannot be pressed.
         await viewer.fitting.fit()
         viewer.fitting.stop()
@@ -118,9 +124,7 @@ def test_stop_leaves_the_document_and_a_later_fit_works(folder):
 def test_a_document_that_is_closed_or_edited_meanwhile_is_told(folder):
     async def use(viewer):
         await let(viewer, **QUICK, fit_by="size", fit_size=[5, 5, 4])
-        fitting = asyncio.ensure_future(do(viewer, viewer.fitting.fit))
-        while not viewer.state.fitting:
-            await asyncio.sleep(0.005)
+        fitting = await begun_fit(viewer)
         await let(viewer, op="gain", knob_gain_factor=2.0)
         await do(viewer, viewer.editing.apply)
         await fitting
@@ -189,9 +193,7 @@ def test_who_works_on_something_else_goes_on_with_that(what, folder):
             await do(viewer, viewer.opening.open_sample, "matte-paper")
         key = viewer.session.current
         await let(viewer, **QUICK, fit_by="size", fit_size=[5, 5, 4])
-        fitting = asyncio.ensure_future(do(viewer, viewer.fitting.fit))
-        while not viewer.state.fitting:
-            await asyncio.sleep(0.005)
+        fitting = await begun_fit(viewer)
         await do(viewer, viewer.opening.open_file, "other.bvb")
         here = viewer.session.current
         await let(viewer, op="gain", knob_gain_factor=2.0)
@@ -215,9 +217,7 @@ def test_a_document_that_is_edited_and_left_meanwhile_is_not_fitted(folder):
     async def use(viewer):
         key = viewer.session.current
         await let(viewer, **QUICK, fit_by="size", fit_size=[5, 5, 4])
-        fitting = asyncio.ensure_future(do(viewer, viewer.fitting.fit))
-        while not viewer.state.fitting:
-            await asyncio.sleep(0.005)
+        fitting = await begun_fit(viewer)
         await let(viewer, op="gain", knob_gain_factor=2.0)
         await do(viewer, viewer.editing.apply)
         await do(viewer, viewer.opening.open_file, "other.bvb")
