@@ -16,6 +16,8 @@ from bvbedit.brdf.materials import material_named
 HERE = Path(__file__).parent
 CHROMIUM = "/usr/bin/chromium"
 SIZE = {"width": 1280, "height": 720}
+# Seconds for which nothing may change.
+STILL = 4
 
 
 @contextmanager
@@ -47,14 +49,16 @@ def choose(shown: Any, name: str, value: str) -> None:
 
 
 def rest(shown: Any) -> None:
-    """Wait until the preview has all its samples and the tooltip is gone."""
+    """Wait until the preview has all its samples, nothing changes any more, and the tooltip is gone."""
     shown.mouse.move(640, 20)
-    # What was seen before may have had all of them, too.
-    shown.wait_for_timeout(2000)
-    shown.wait_for_function(
-        "document.querySelector('[data-test=\"preview note\"]').innerText.includes('64 samples')", timeout=60_000
-    )
-    shown.wait_for_timeout(1500)
+    same, before = 0, b""
+    # What was seen before may have had all of them, too: only what stays is done.
+    while same < STILL:
+        shown.wait_for_timeout(1000)
+        now = shown.screenshot()
+        done = "64 samples" in shown.locator('[data-test="preview note"]').inner_text()
+        same = same + 1 if done and now == before else 0
+        before = now
 
 
 def fitted(folder: Path) -> None:
