@@ -1,6 +1,6 @@
 """Figures of errors over n, for nets of n x n x 4n control points: the paper's Fig. 5, 6 and 7."""
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,6 +9,7 @@ from bvbedit.study.classes import groups
 from bvbedit.study.nets import Sweep, known, number_sides, quoted, side, sweeps
 from bvbedit.study.plots import Missing, Numbers, Plot, agreement
 from bvbedit.study.quantities import E_AVG, E_AVG_45, E_MAX, E_MAX_45, Quantity, mae, pae
+from bvbedit.study.statistics import median
 from bvbedit.study.style import GREY, PALETTE, legend, log_axis, looks, panels, pretty
 from bvbedit.study.table import Row, Table
 
@@ -64,11 +65,17 @@ def _error_plot(
     materials = [m for m in table.materials if any(row.material == m for row in every)]
     few = len(materials) <= MOST_COLOURS
     series = list(found)
-    rose = "; ".join(f"{pretty_words(q.label)} in {_rises(found, q)}" for q in quantities)
+    shared = set.intersection(*({side(row) for row in rows} for rows in found.values()))
+    rose = (
+        "What grows from one n to the next larger one that all these series have: "
+        + "; ".join(f"{pretty_words(q.label)} in {_rises(found, q, shared)}" for q in quantities)
+        if len(shared) > 1
+        else "These series share no two n, so that how often they grow is not compared"
+    )
     said = (
         f"{words}, for nets of n x n x 4n control points; {quoted(series)}. "
         + ("A colour for each material. " if few else "A thin line for each material, the median bold. ")
-        + f"What grows from one n to the next larger one: {rose}. "
+        + f"{rose}. "
         + agreement(every, table.scenes)
     )
 
@@ -95,16 +102,22 @@ def _line(rows: Sequence[Row], quantity: Quantity) -> tuple[list[int], list[floa
     return sorted(values), [values[n] for n in sorted(values)]
 
 
-def _rises(found: Sweep, quantity: Quantity) -> str:
-    """Return in words in how many steps to a larger n the quantity grows: the paper saw errors fluctuate."""
+def _rises(found: Sweep, quantity: Quantity, shared: Set[int | None]) -> str:
+    """Return in words in how many steps to a larger n the quantity grows, and by what: the paper saw errors fluctuate.
+
+    Only ``shared`` n count, so that the steps of all series are alike.
+    """
     told = []
     for series, rows in found.items():
-        grew = steps = 0
+        steps: list[float] = []
         for material in dict.fromkeys(row.material for row in rows):
-            values = _line([r for r in rows if r.material == material], quantity)[1]
-            grew += int(np.sum(np.diff(values) > 0))
-            steps += max(0, len(values) - 1)
-        told.append(f"{grew} of {steps} steps of “{series}”")
+            own = [row for row in rows if row.material == material and side(row) in shared]
+            values = np.asarray(_line(own, quantity)[1])
+            with np.errstate(divide="ignore", invalid="ignore"):
+                steps += (values[1:] / values[:-1]).tolist()
+        grown = [factor for factor in steps if factor > 1]
+        by = f" (to {median(grown):.3g} times as much in the middle, {max(grown):.3g} at most)" if grown else ""
+        told.append(f"{len(grown)} of {len(steps)} steps of “{series}”{by}")
     return " and ".join(told)
 
 

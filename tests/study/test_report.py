@@ -182,6 +182,26 @@ def test_series_over_n_are_told_by_their_nets():
     assert side(next(r for r in table.rows if r.chart == "half-diff")) is None
 
 
+def test_how_often_errors_grow_is_told_of_the_n_that_all_series_have():
+    rows = [
+        replace(row, e_max_45=value, e_avg_45=1 / value)
+        for row in made_table(1, sides=(4, 6, 8), sizes=(), failing=0).rows
+        if row.series in ("paper", "paper dominant")
+        for value in [{"paper 4": 1.0, "paper 6": 5.0, "paper 8": 3.0}.get(row.configuration, 2.0)]
+    ]
+    assert len(rows) == 6
+    without_six = [r for r in rows if r.series == "paper" or side(r) != 6]
+    words = plots_of(Table(tuple(without_six), ("sphere",)))["fig5-errors-45"].words
+    assert "E_max at 45° in 1 of 1 steps of “paper” (to 3 times as much in the middle, 3 at most)" in words
+    assert "0 of 1 steps of “paper dominant”; E_avg at 45° in 0 of 1 steps" in words
+    words = plots_of(Table(tuple(rows), ("sphere",)))["fig5-errors-45"].words
+    assert "E_max at 45° in 1 of 2 steps of “paper” (to 5 times as much in the middle, 5 at most)" in words
+    assert "E_avg at 45° in 1 of 2 steps of “paper” (to 1.67 times as much in the middle, 1.67 at most)" in words
+    apart = [r for r in rows if (r.series == "paper") == (side(r) < 8)]
+    apart += [replace(r, size="10x10x40") for r in apart if r.series != "paper"]
+    assert "share no two n" in plots_of(Table(tuple(apart), ("sphere",)))["fig5-errors-45"].words
+
+
 def test_what_cannot_be_drawn_is_told(tmp_path):
     table = made_table(2, sides=(20,), sizes=(1024,), scenes=())
     missing = [p for p in figures(table) if isinstance(p, Missing)]
