@@ -19,6 +19,10 @@ T = TypeVar("T")
 
 # Rows of a block: three channels of them are 768 KB.
 ROWS = 1 << 15
+# Matrices are multiplied by one thread: by several the last bits are others, and a recipe would not make the same fit
+# again. glibc (others do not read it) gives threads two heaps in all, in place of eight a core: what fits leave in so
+# many never goes back to the system, and a worker had grown by 40 MB a material, to 1.5 GB after fifty.
+SPAWNED = {"OPENBLAS_NUM_THREADS": "1", "MALLOC_ARENA_MAX": "2"}
 
 
 def side_by_side(work: Callable[[S], T], items: Iterable[S]) -> list[T]:
@@ -57,23 +61,23 @@ def each_block(count: int, rows: int, work: Callable[[slice], T]) -> list[T]:
 
 
 @contextmanager
-def one_matrix_thread() -> Iterator[None]:
-    """Let processes that are spawned meanwhile multiply matrices by one thread, and not run the main module again.
+def spawning() -> Iterator[None]:
+    """Let processes that are spawned meanwhile work as ``SPAWNED`` says, and not run the main module again.
 
-    By several threads the last bits are others, and a recipe would not make the same fit again. What is done in them is
-    imported from its own module, and a script without a guard would start itself over and over.
+    What is done in them is imported from its own module, and a script without a guard would start itself over and over.
     """
-    main, threads = sys.modules["__main__"], os.environ.get("OPENBLAS_NUM_THREADS")
+    main, before = sys.modules["__main__"], {name: os.environ.get(name) for name in SPAWNED}
     sys.modules["__main__"] = ModuleType("__main__")
-    os.environ["OPENBLAS_NUM_THREADS"] = "1"
+    os.environ.update(SPAWNED)
     try:
         yield
     finally:
         sys.modules["__main__"] = main
-        if threads is None:
-            del os.environ["OPENBLAS_NUM_THREADS"]
-        else:
-            os.environ["OPENBLAS_NUM_THREADS"] = threads
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
 
 
 def end_with_parent() -> None:

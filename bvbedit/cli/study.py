@@ -36,7 +36,7 @@ def study(
         A plan in TOML, in place of 40 configurations: the paper's, both charts over bytes, degrees, precisions, and
         analytic models.
     jobs
-        Processes that share the work. Each takes about 1 GB with MERL files.
+        Processes that share the work. Each takes up to 1 GB.
     dask
         The address of a Dask scheduler whose workers share the work instead.
     as_json

@@ -24,7 +24,7 @@ from bvbedit.io.files import reading, replacing
 from bvbedit.study.cells import Task, measured, versions
 from bvbedit.study.plan import Configuration, Plan
 from bvbedit.study.table import RESULTS, Row, to_csv
-from bvbedit.threads import end_with_parent, one_matrix_thread
+from bvbedit.threads import end_with_parent, spawning
 
 SUFFIXES = (".binary", ".bsdf", ".npz")
 PLAN, VERSIONS, CELLS = "plan.toml", "versions.json", "cells"
@@ -176,7 +176,7 @@ def _lost(task: Task, error: BrokenProcessPool) -> dict[str, Any]:
 @contextmanager
 def _pool(jobs: int) -> Iterator[Executor]:
     # Spawned: a fork would inherit the locks of running threads.
-    with one_matrix_thread():
+    with spawning():
         executor = ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), initializer=_share, initargs=(jobs,))
         try:
             yield executor

@@ -116,9 +116,14 @@ def _rises(found: Sweep, quantity: Quantity, shared: Set[int | None]) -> str:
             with np.errstate(divide="ignore", invalid="ignore"):
                 steps += (values[1:] / values[:-1]).tolist()
         grown = [factor for factor in steps if factor > 1]
-        by = f" (to {median(grown):.3g} times as much in the middle, {max(grown):.3g} at most)" if grown else ""
+        by = f" (the median by {_percent(median(grown))}, the largest by {_percent(max(grown))})" if grown else ""
         told.append(f"{len(grown)} of {len(steps)} steps of “{series}”{by}")
     return " and ".join(told)
+
+
+def _percent(factor: float) -> str:
+    percent = 100 * (factor - 1)
+    return f"{percent:,.0f} %" if percent >= 10 else f"{percent:.2g} %"
 
 
 def _by_material(found: Sweep, materials: Sequence[str], quantities: Sequence[Quantity]) -> "Figure":

@@ -12,7 +12,7 @@ from multiprocessing.process import BaseProcess
 from typing import Any
 
 from bvbedit.errors import BvbError
-from bvbedit.threads import one_matrix_thread
+from bvbedit.threads import spawning
 
 # What is done in the process: called with its arguments and a function that is told the share done. It and its
 # arguments must pickle.
@@ -39,7 +39,7 @@ class Worker:
             return
         self._pipe, other = get_context("spawn").Pipe()
         process = get_context("spawn").Process(target=_serve, args=(other,), daemon=True)
-        with one_matrix_thread():
+        with spawning():
             process.start()
         self._process = process
         other.close()

@@ -192,11 +192,11 @@ def test_how_often_errors_grow_is_told_of_the_n_that_all_series_have():
     assert len(rows) == 6
     without_six = [r for r in rows if r.series == "paper" or side(r) != 6]
     words = plots_of(Table(tuple(without_six), ("sphere",)))["fig5-errors-45"].words
-    assert "E_max at 45° in 1 of 1 steps of “paper” (to 3 times as much in the middle, 3 at most)" in words
+    assert "E_max at 45° in 1 of 1 steps of “paper” (the median by 200 %, the largest by 200 %)" in words
     assert "0 of 1 steps of “paper dominant”; E_avg at 45° in 0 of 1 steps" in words
     words = plots_of(Table(tuple(rows), ("sphere",)))["fig5-errors-45"].words
-    assert "E_max at 45° in 1 of 2 steps of “paper” (to 5 times as much in the middle, 5 at most)" in words
-    assert "E_avg at 45° in 1 of 2 steps of “paper” (to 1.67 times as much in the middle, 1.67 at most)" in words
+    assert "E_max at 45° in 1 of 2 steps of “paper” (the median by 400 %, the largest by 400 %)" in words
+    assert "E_avg at 45° in 1 of 2 steps of “paper” (the median by 67 %, the largest by 67 %)" in words
     apart = [r for r in rows if (r.series == "paper") == (side(r) < 8)]
     apart += [replace(r, size="10x10x40") for r in apart if r.series != "paper"]
     assert "share no two n" in plots_of(Table(tuple(apart), ("sphere",)))["fig5-errors-45"].words
