@@ -66,6 +66,10 @@ class Chart(ABC):
     def __repr__(self) -> str:
         return f"<chart {self.name}>"
 
+    def __reduce__(self) -> tuple[object, ...]:
+        # Charts are told apart by identity: in another process, and in a copy, each is the one of its name.
+        return chart_named, (self.name,)
+
 
 class InOut(Chart):
     """The paper's chart: u = theta_i/(pi/2), v = theta_o/(pi/2), w = |phi_i - phi_o|/pi folded to [0, pi].

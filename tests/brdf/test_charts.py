@@ -1,7 +1,9 @@
 """Charts: there and back, against explicit rotations, and with a Jacobian that is the measure it claims to be."""
 
+import copy
 import itertools
 import math
+import pickle
 
 import numpy as np
 import pytest
@@ -352,6 +354,12 @@ def test_the_grid_of_in_out_is_the_papers():
 def test_charts_are_found_by_name(chart):
     assert chart_named(chart.name) is chart
     assert chart.name in repr(chart)
+
+
+@each
+def test_a_chart_is_itself_in_another_process_and_in_a_copy(chart):
+    assert pickle.loads(pickle.dumps(chart)) is chart
+    assert copy.deepcopy(chart) is chart
 
 
 @pytest.mark.parametrize("name", ["half", "", None, ["in-out"]])

@@ -2,6 +2,7 @@
 
 import functools
 import gc
+import pickle
 import weakref
 
 import numpy as np
@@ -242,6 +243,9 @@ def test_a_measurement_on_the_fits_own_chart_is_taken_at_its_own_nodes(chart, rn
     reliable = np.minimum(*(w[:, 2] for w in _nodes(chart))) >= np.cos(np.radians(85))
     np.testing.assert_array_equal(trusted, measured.valid & reliable.reshape(valid.shape))
     assert table.clamped == measured.clamped > 0
+    # In another process, too.
+    sent = pickle.loads(pickle.dumps(measured))
+    assert tabulate(sent, chart).axes is sent.axes
 
 
 @each_chart
