@@ -82,6 +82,7 @@ def escaping() -> Iterator[Escaped]:
     try:
         yield escaped
         gc.collect()  # tasks tell of their exceptions when they are freed
+        gc.freeze()  # the next test is not to look through what this one leaves
     finally:
         logging.getLogger().removeHandler(escaped)
     escaped.check()
