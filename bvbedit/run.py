@@ -3,10 +3,9 @@
 import json
 import os
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from hashlib import sha256
-from multiprocessing import get_context
 from pathlib import Path
 from time import perf_counter
 from typing import Any, Literal
@@ -22,7 +21,7 @@ from bvbedit.io import check_target, make_folder
 from bvbedit.io.bvb import load_recipe
 from bvbedit.io.export import export
 from bvbedit.io.files import reading
-from bvbedit.threads import end_with_parent
+from bvbedit.processes import as_done, processes
 
 # Where many materials are run, and the recipe names no file for each.
 EACH = Output("{name}.bvb")
@@ -122,20 +121,18 @@ def _outcomes(jobs: Sequence[Job], workers: int, again: bool) -> Iterator[tuple[
         for n, job in enumerate(jobs):
             yield n, attempt(job, again)
         return
-    # Spawned: a fork would inherit the locks of running threads.
-    with ProcessPoolExecutor(
-        min(workers, len(jobs)), mp_context=get_context("spawn"), initializer=end_with_parent
-    ) as pool:
-        futures = {pool.submit(attempt, job, again): n for n, job in enumerate(jobs)}
-        for future in as_completed(futures):
-            n = futures[future]
+    count = min(workers, len(jobs))
+    with processes(count) as executor:
+        for n, future in as_done(executor, partial(attempt, again=again), jobs, count):
             error = future.exception()
-            if error is not None:
+            if error is None:
+                yield n, future.result()
+            elif isinstance(error, Exception):
                 # The process itself was lost, as it is when memory runs out.
                 words = f"the process ended: {error}. Run it again with fewer jobs."
                 yield n, Outcome(str(jobs[n].source), "failed", error=words)
             else:
-                yield n, future.result()
+                raise error
 
 
 def attempt(job: Job, again: bool = False) -> Outcome:

@@ -5,10 +5,8 @@ import shutil
 import zipfile
 import zlib
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, Literal
 
@@ -19,8 +17,8 @@ from bvbedit.brdf.goniophotometer import GRIDS
 from bvbedit.errors import BvbError
 from bvbedit.io import check_target, make_folder, save
 from bvbedit.io.merl import HEADER
+from bvbedit.processes import as_done, processes
 from bvbedit.spline.arguments import is_whole, shown
-from bvbedit.threads import end_with_parent
 
 GridName = Literal["merl", "paper"]
 SUFFIXES: dict[GridName, str] = {"merl": ".binary", "paper": ".npz"}
@@ -134,15 +132,13 @@ def _made(tasks: Sequence[Task], jobs: int) -> Iterator[str]:
         for task in tasks:
             yield _make(task)
         return
-    # Spawned: a fork would inherit the locks of running threads.
-    pool = ProcessPoolExecutor(min(jobs, len(tasks)), mp_context=get_context("spawn"), initializer=end_with_parent)
+    count = min(jobs, len(tasks))
     try:
-        for future in as_completed([pool.submit(_make, task) for task in tasks]):
-            yield future.result()
+        with processes(count) as executor:
+            for _, future in as_done(executor, _make, tasks, count):
+                yield future.result()
     except BrokenProcessPool:
         raise BvbError("A process was lost, as it is when memory runs out. Run it again with fewer jobs.") from None
-    finally:
-        pool.shutdown(cancel_futures=True)
 
 
 def _make(task: Task) -> str:

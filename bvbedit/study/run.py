@@ -1,15 +1,13 @@
 """Running a study: cell after cell in processes, each kept as it is done, so that an interrupted one goes on."""
 
 import json
-import os
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import Executor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import replace
 from hashlib import sha256
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +19,10 @@ from bvbedit.edit.recipe import Source
 from bvbedit.errors import BvbError
 from bvbedit.io import make_folder
 from bvbedit.io.files import reading, replacing
+from bvbedit.processes import as_done, processes
 from bvbedit.study.cells import Task, measured, versions
 from bvbedit.study.plan import Configuration, Plan
 from bvbedit.study.table import RESULTS, Row, to_csv
-from bvbedit.threads import end_with_parent, spawning
 
 SUFFIXES = (".binary", ".bsdf", ".npz")
 PLAN, VERSIONS, CELLS = "plan.toml", "versions.json", "cells"
@@ -128,37 +126,30 @@ def _measured(todo: dict[Path, Task], jobs: int, dask: str | None) -> Iterator[t
     """Yield the rows as they are done."""
     if not todo:
         return
+    places, tasks = list(todo), list(todo.values())
     if dask is not None:
         with _cluster(dask) as executor:
-            yield from _shared(executor, todo)
+            for n, future in as_done(executor, measured, tasks):
+                yield places[n], future.result()
         return
     # One process, too, is another than ours: what matrices are multiplied by there is known, and memory is given back.
-    left = dict(todo)
+    left, count = dict(todo), min(jobs, len(todo))
     try:
-        with _pool(min(jobs, len(left))) as executor:
-            for place, row in _shared(executor, todo):
-                del left[place]
-                yield place, row
+        with processes(count) as executor:
+            for n, future in as_done(executor, measured, tasks, count):
+                row = future.result()
+                del left[places[n]]
+                yield places[n], row
     except BrokenProcessPool:
         # A process was lost, as when memory runs out, and with it what the others had in hand. One by one it shows
         # which cell it is that cannot be done.
         for place, task in left.items():
             try:
-                with _pool(1) as executor:
+                with processes(1) as executor:
                     row = executor.submit(measured, task).result()
             except BrokenProcessPool as error:
                 row = _lost(task, error)
             yield place, row
-
-
-def _shared(executor: Executor, todo: dict[Path, Task]) -> Iterator[tuple[Path, dict[str, Any]]]:
-    futures: dict[Future[dict[str, Any]], Path] = {executor.submit(measured, task): p for p, task in todo.items()}
-    try:
-        for future in as_completed(futures):
-            yield futures[future], future.result()
-    finally:
-        for future in futures:
-            future.cancel()
 
 
 def _lost(task: Task, error: BrokenProcessPool) -> dict[str, Any]:
@@ -171,28 +162,6 @@ def _lost(task: Task, error: BrokenProcessPool) -> dict[str, Any]:
         "status": "failed",
         "reason": f"the process ended: {error}",
     }
-
-
-@contextmanager
-def _pool(jobs: int) -> Iterator[Executor]:
-    # Spawned: a fork would inherit the locks of running threads.
-    with spawning():
-        executor = ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), initializer=_share, initargs=(jobs,))
-        try:
-            yield executor
-        finally:
-            executor.shutdown(wait=True, cancel_futures=True)
-
-
-def _share(jobs: int) -> None:
-    """Let a process use its share of the processors, leave Ctrl-C to who has started it, and end with that one."""
-    import signal
-
-    import numba
-
-    end_with_parent()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    numba.set_num_threads(max(1, min(numba.get_num_threads(), (os.cpu_count() or 1) // jobs)))
 
 
 @contextmanager

@@ -12,7 +12,7 @@ from multiprocessing.process import BaseProcess
 from typing import Any
 
 from bvbedit.errors import BvbError
-from bvbedit.threads import spawning
+from bvbedit.processes import spawning
 
 # What is done in the process: called with its arguments and a function that is told the share done. It and its
 # arguments must pickle.
