@@ -126,30 +126,39 @@ def _measured(todo: dict[Path, Task], jobs: int, dask: str | None) -> Iterator[t
     """Yield the rows as they are done."""
     if not todo:
         return
-    places, tasks = list(todo), list(todo.values())
     if dask is not None:
         with _cluster(dask) as executor:
-            for n, future in as_done(executor, measured, tasks):
-                yield places[n], future.result()
+            yield from _rows(executor, todo)
         return
     # One process, too, is another than ours: what matrices are multiplied by there is known, and memory is given back.
-    left, count = dict(todo), min(jobs, len(todo))
-    try:
-        with processes(count) as executor:
-            for n, future in as_done(executor, measured, tasks, count):
-                row = future.result()
-                del left[places[n]]
-                yield places[n], row
-    except BrokenProcessPool:
-        # A process was lost, as when memory runs out, and with it what the others had in hand. One by one it shows
-        # which cell it is that cannot be done.
-        for place, task in left.items():
-            try:
-                with processes(1) as executor:
-                    row = executor.submit(measured, task).result()
-            except BrokenProcessPool as error:
-                row = _lost(task, error)
-            yield place, row
+    left = dict(todo)
+    while left:
+        count = min(jobs, len(left))
+        try:
+            with processes(count) as executor:
+                for place, row in _rows(executor, dict(left), count):
+                    del left[place]
+                    yield place, row
+        except BrokenProcessPool:
+            # A process was lost, as when memory runs out, and with it what the others had in hand: the first ones left.
+            # One by one it shows which cell it is that cannot be done.
+            for place in list(left)[:count]:
+                task = left.pop(place)
+                try:
+                    with processes(1) as executor:
+                        (found,) = _rows(executor, {place: task}, 1)
+                except BrokenProcessPool as error:
+                    found = place, _lost(task, error)
+                yield found
+
+
+def _rows(
+    executor: Executor, todo: dict[Path, Task], at_once: int | None = None
+) -> Iterator[tuple[Path, dict[str, Any]]]:
+    """Yield the rows as they are done. Raises BrokenProcessPool where a process is lost."""
+    places = list(todo)
+    for n, future in as_done(executor, measured, list(todo.values()), at_once):
+        yield places[n], future.result()
 
 
 def _lost(task: Task, error: BrokenProcessPool) -> dict[str, Any]:

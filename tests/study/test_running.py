@@ -221,6 +221,26 @@ def test_a_damaged_measurement_is_a_row(folder, tmp_path):
     assert "broken.npz" in row.reason
 
 
+def row_or_lost(task):
+    """A row without measuring; where the net is 5 x 4 x 4 the process ends, as when memory runs out."""
+    if task.configuration.fit.size == (5, 4, 4):
+        os._exit(1)
+    told = {"material": task.material, "configuration": task.configuration.name, "series": "s", "kind": "spline"}
+    return {**told, "status": "done", "file_bytes": os.getpid()}
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_a_lost_process_costs_its_own_cell_alone(jobs, folder, tmp_path, monkeypatch):
+    monkeypatch.setattr("bvbedit.study.run.measured", row_or_lost)
+    sizes = ((4, 4, 4), (5, 4, 4), *((6, 4, n) for n in range(4, 12)))
+    plan = Plan(series=(Series("s", chart="half-diff", encoding="root", size=sizes),), pictures=Pictures((), 8, 1))
+    rows = run_study(plan, materials_of([folder / "copper.npz"]), tmp_path / "study", jobs=jobs)
+    assert [row.status for row in rows] == ["done", "failed", *["done"] * 8]
+    assert "the process ended" in rows[1].reason
+    # The first processes, one for each cell that was in hand with the lost one, and as many as at first for all others.
+    assert len({row.file_bytes for row in rows if row.done}) <= jobs + (jobs - 1) + jobs
+
+
 def test_a_full_disk_ends_it_in_one_line_and_loses_nothing(folder, tmp_path, monkeypatch):
     from bvbedit.study import run as running
 
